@@ -1,0 +1,40 @@
+// Files that appear whole or not at all.
+
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+
+namespace haarlight {
+
+/// A file being written under a temporary name beside its final one. commit() makes it appear:
+/// flush, fsync, rename, fsync of the folder. Without commit() the destructor removes the
+/// temporary, and what was there under the final name stays untouched.
+/// Every call throws Error{io} naming the final file and the system's reason.
+class AtomicFile {
+ public:
+  explicit AtomicFile(const std::filesystem::path& final_path);
+  ~AtomicFile();
+  AtomicFile(const AtomicFile&) = delete;
+  AtomicFile& operator=(const AtomicFile&) = delete;
+
+  void write(const void* bytes, std::size_t size);  ///< appends
+  void write_at(std::uint64_t offset, const void* bytes, std::size_t size);
+  std::uint64_t size() const { return size_; }  ///< bytes appended so far
+  void commit();
+
+ private:
+  std::filesystem::path final_path_, temporary_path_;
+  int descriptor_ = -1;
+  std::uint64_t size_ = 0;
+};
+
+/// Same promise for code that insists on opening its own file: `write` is called with the temporary
+/// path (same folder, same suffix) and what it leaves there is synced and renamed.
+void write_atomically(const std::filesystem::path& final_path,
+                      const std::function<void(const std::filesystem::path& temporary)>& write);
+
+}  // namespace haarlight

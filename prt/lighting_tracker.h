@@ -1,0 +1,105 @@
+// Decides, frame by frame, which wavelets of the light change and by how much: NWA, BI and PBI
+// (Overbeck, Ben-Artzi, Ramamoorthi, Grinspun 2006, "Exploiting Temporal Coherence for Incremental
+// All-Frequency Relighting"). Knows nothing of pixels, vertices or clusters.
+
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "prt/lighting_update.h"
+#include "wavelet/haar.h"
+#include "wavelet/top_k.h"
+
+namespace haarlight {
+
+enum class LightingMethod {
+  nwa,        ///< non-linear approximation of the frame itself (Ng 2003): every band is reset
+  bi,         ///< basic incremental: approximate the change since what is shown (section 3)
+  pbi,        ///< per-band incremental: each band whichever promises less error (section 5)
+  reference,  ///< every changed coefficient, whatever the number: exact
+};
+
+/// How PBI decides which bands to reset.
+enum class BandChoice {
+  simple,      ///< band by band: keep it when ||L_new - L_shown||_1 < ||L_new||_1 (section 5.2.2)
+  exhaustive,  ///< all 2^N combinations, least weighted error after the update (section 5.2.1); the
+               ///< baseline that `simple` is compared with
+};
+
+struct LightingOptions {
+  LightingMethod method = LightingMethod::pbi;
+  int wavelets = 30;           ///< most deltas in one update, >= 1; ignored by `reference`
+  std::vector<float> weights;  ///< importance of a unit of each orthonormal coefficient, finite and
+                               ///< >= 0, layout.size() of them; empty = area_weights()
+  BandChoice band_choice = BandChoice::simple;
+};
+
+std::optional<LightingMethod> lighting_method_from_name(std::string_view name);
+std::string lighting_method_name(LightingMethod method);
+
+/// sqrt(area) of each wavelet in texels. Ng 2003 ranks by area x |unnormalised coefficient|; an
+/// orthonormal coefficient is sqrt(area) times the unnormalised one, which leaves sqrt(area).
+std::vector<float> area_weights(const HaarLayout& layout);
+
+/// Turns target lightings into updates. Let L be the target of a frame and S = shown() what every
+/// consumer holds. Per band b the work is on
+///   D_b = L_b - S_b  (keep the band: Eqs. 5, 6)   or   D_b = L_b  (reset it: Eq. 2),
+/// and the update takes the `wavelets` entries of D with the largest weight * |D| (L1 over the
+/// three channels), over all bands together. nwa resets every band, bi none, pbi those for which
+/// the weighted || L_b ||_1 <= || L_b - S_b ||_1; a band with nothing shown needs no reset.
+/// Entries that are already right are never spent on, so a still light is reached exactly after at
+/// most size / wavelets frames and from then on updates are empty.
+///
+/// Invariant of every consumer: picture == T * shown().
+class LightingTracker {
+ public:
+  /// Starts dark: shown() is all zero. Throws Error{invalid_argument} naming the option that is
+  /// out of range.
+  LightingTracker(const HaarLayout& layout, LightingOptions options);
+
+  /// The update for the next frame; valid until the next call (its memory is reused). `target` is
+  /// layout.size() coefficients, all finite, magnitude up to 1.8e18; otherwise throws
+  /// Error{invalid_argument} and leaves the tracker as it was. O(size()); no heap use once warm.
+  const LightingUpdate& advance(std::span<const Rgb> target);
+
+  /// Shows `target` in full, as at the start of a sequence (Overbeck 2006, section 3, sets
+  /// L~0 = L0): every band reset, every non-zero coefficient in the update. Same errors.
+  const LightingUpdate& start_exact(std::span<const Rgb> target);
+
+  /// Changes the budget or method from the next frame on. Throws as the constructor does, and then
+  /// keeps the old options.
+  void set_options(LightingOptions options);
+
+  const LightingOptions& options() const { return options_; }
+  const HaarLayout& layout() const { return layout_; }
+  std::span<const Rgb> shown() const { return shown_; }
+
+ private:
+  void check_target(std::span<const Rgb> target) const;
+  void choose_bands_exhaustively();
+  void emit(std::span<const Rgb> target);
+
+  HaarLayout layout_;
+  LightingOptions options_;
+  std::vector<float> weights_;
+  std::vector<Rgb> shown_;
+  LightingUpdate update_;
+  // Scratch: ranking keys of both choices, and of the choice made.
+  std::vector<float> keep_key_, reset_key_;
+  std::vector<int> chosen_;
+  TopK top_k_;
+  struct BandScratch;
+  std::vector<int> band_chosen_;
+};
+
+/// Area-weighted L1 difference relative to the area-weighted L1 norm of the target, over all
+/// channels: the error that Overbeck 2006, Figure 7 plots. 0 when both are black, and 1 for
+/// something shown under a black target.
+double lighting_error(const HaarLayout& layout, std::span<const Rgb> shown,
+                      std::span<const Rgb> target);
+
+}  // namespace haarlight

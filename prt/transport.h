@@ -1,0 +1,96 @@
+// Precomputed light transport T: rows x coefficients, block-sparse and 8-bit, read-only.
+// docs/transport_format.md gives the bytes; prt/transport_writer.h makes it; prt/row_sums.h uses it.
+
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/camera.h"
+#include "core/rgb.h"
+#include "wavelet/haar.h"
+
+namespace haarlight {
+
+/// Rows are stored in blocks of 16, 4 blocks a tile, 64 tiles a chunk. For a picture a block is 4x4
+/// pixels and a tile 8x8, so that rows of a block see nearly the same light; a chunk is 64 nearby
+/// tiles. Inside a chunk the order is column by column, so that one wavelet's entries are one
+/// stream of at most a few KiB.
+inline constexpr int kBlockRows = 16;
+inline constexpr int kTileBlocks = 4;
+inline constexpr int kTileRows = kBlockRows * kTileBlocks;
+inline constexpr int kChunkTiles = 64;
+inline constexpr int kChunkBlocks = kChunkTiles * kTileBlocks;
+inline constexpr int kChunkRows = kChunkTiles * kTileRows;
+inline constexpr std::uint32_t kNoOutput = 0xffffffffu;
+
+/// What a transport is of; kept in its file.
+struct TransportInfo {
+  int face_size = 64;
+  int width = 0, height = 0;  ///< picture size; outputs are width * height pixels
+  Camera camera;              ///< the view, for drawing the environment behind the scene
+  std::string meta;           ///< JSON object: how it was made, its options, measured error
+};
+
+/// One column's non-zero blocks inside a chunk.
+/// A block whose rows share their colour (grey) has one scale and 16 values; the others (see
+/// Transport::rgb_blocks) three scales and 3 x 16 values, channel after channel.
+/// Entry = value * scale, the scale being the upper half of a float.
+struct ColumnBlocks {
+  const std::uint64_t* present = nullptr;  ///< 4 words: bit b says block b is stored; null: none
+  const std::uint16_t* scales = nullptr;
+  const std::int8_t* values = nullptr;
+};
+
+/// T itself. Immutable, safe to read from any number of threads; copies share the data.
+class Transport {
+ public:
+  /// Maps a file and checks every byte of it: sizes before anything is allocated, checksums, and
+  /// that each column's blocks lie inside their chunk. Throws Error{missing} if there is no such
+  /// file, Error{format} if it is not one of ours, is cut short, damaged or of another version
+  /// (the message says which), Error{io} if the system refuses.
+  static Transport open(const std::filesystem::path& file);
+
+  const HaarLayout& layout() const;
+  const TransportInfo& info() const;
+  int width() const { return info().width; }
+  int height() const { return info().height; }
+  /// Rows as stored, padding included: chunk_count() * kChunkRows.
+  int rows() const;
+  int chunk_count() const;
+
+  /// Bytes of the chunks alone (what a frame streams from) and of the whole file.
+  std::uint64_t chunk_bytes() const;
+  std::uint64_t file_bytes() const;
+
+  /// Per stored row: the output (pixel y * width + x) it belongs to, or kNoOutput for padding.
+  std::span<const std::uint32_t> row_output() const;
+  /// Per stored row: the colour its sum is multiplied with: the albedo of a grey row, 1 for an RGB
+  /// row.
+  std::span<const Rgb> row_color() const;
+  /// Per output: share of the pixel covered by the scene, [0, 1]; the rest shows the environment.
+  std::span<const float> coverage() const;
+  /// Per coefficient: L2 norm over all rows and channels of colour * T[:, j]. The picture's squared
+  /// change when coefficient j alone changes by 1 in every channel; the weights of
+  /// "transport-weighted" selection.
+  std::span<const float> column_norms() const;
+
+  /// Which blocks of a chunk are RGB: 4 words, the same for all columns.
+  const std::uint64_t* rgb_blocks(int chunk) const;
+  /// Column `index` inside `chunk`. Requires both in range.
+  ColumnBlocks column(int chunk, int index) const;
+  /// Stored bytes of column `index` over all chunks.
+  std::uint64_t column_bytes(int index) const;
+
+  struct Data;
+  explicit Transport(std::shared_ptr<const Data> data);
+
+ private:
+  std::shared_ptr<const Data> data_;
+};
+
+}  // namespace haarlight

@@ -1,0 +1,93 @@
+// Distant light: loading it, checking it at the door, turning it, sampling it onto a cube map.
+
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/image.h"
+#include "core/vec.h"
+#include "wavelet/cubemap.h"
+#include "wavelet/projection.h"
+
+namespace haarlight {
+
+/// What the gate repaired or noticed while an environment was read.
+struct EnvironmentReport {
+  std::int64_t negative_pixels = 0;    ///< pixels with a negative channel, made 0
+  double smallest = 0;                 ///< the most negative value met
+  std::int64_t not_finite_pixels = 0;  ///< NaN or infinite, made 0
+};
+
+struct EnvironmentOptions {
+  std::optional<Projection> projection;  ///< none: by the shape of the picture
+  double scale = 1;                      ///< multiplies radiance; > 0
+};
+
+/// Radiance arriving from every direction, W m^-2 sr^-1, linear Rec.709.
+class Environment {
+ public:
+  /// Takes a picture in. Negative radiance (lossy EXR, resize ringing) becomes 0 and is counted.
+  /// Up to 1 pixel in 1000 may be NaN or infinite: they become 0 and are counted; more throw
+  /// Error{format}. A value above 1.8e18 (its square leaves float) throws Error{format}, a shape
+  /// that is no known projection Error{invalid_argument}. `name` is used in messages.
+  Environment(Image picture, const EnvironmentOptions& options = {},
+              const std::string& name = "environment");
+
+  Projection projection() const { return projection_; }
+  const Image& picture() const { return picture_; }
+  const EnvironmentReport& report() const { return report_; }
+
+  /// Radiance from one direction (any non-zero length), bilinear in the picture; for backgrounds.
+  Rgb radiance(const Vec3& direction) const;
+
+ private:
+  Image picture_;
+  Projection projection_ = Projection::latlong;
+  EnvironmentReport report_;
+};
+
+/// load_image, then the gate. Throws as both do, with the file's name in the message.
+Environment load_environment(const std::filesystem::path& file,
+                             const EnvironmentOptions& options = {});
+
+/// An environment made ready to be turned and averaged onto a cube map, quickly, every frame.
+///
+/// The sphere is cut into about 16 small cells a texel of nearly equal solid angle; each holds the
+/// energy (radiance x solid angle) of the picture's pixels in it, their solid angle and their
+/// centre of energy. project() turns every cell and hands its energy to the texels below its
+/// footprint, then divides by the solid angle that arrived in the same way. So a constant
+/// environment stays constant exactly, a light of one pixel keeps its energy within 2 % however it
+/// is turned, moves smoothly, and neither vanishes nor flickers.
+class EnvironmentSampler {
+ public:
+  /// `face_size` is n, a power of two in [1, 1024]. Throws Error{invalid_argument} otherwise.
+  EnvironmentSampler(const Environment& environment, int face_size);
+
+  int face_size() const { return n_; }
+
+  /// Mean radiance of each texel of the environment turned by `rotation`: light that came from
+  /// direction d comes from rotation * d. `out` has n = face_size(). No heap use. The same bits on
+  /// any number of threads.
+  void project(const Rotation& rotation, Cubemap& out) const;
+
+ private:
+  struct Cell {
+    float x, y, z;     // unit direction, the centre
+    float r, g, b;     // radiance x solid angle
+    float solid_angle;
+  };
+  int n_;
+  double cell_width_ = 0;  // radians
+  std::vector<Cell> cells_;
+  mutable std::vector<float> scratch_;
+};
+
+/// One call: texel averages of `environment` turned by `rotation`.
+Cubemap environment_to_cubemap(const Environment& environment, int face_size,
+                               const Rotation& rotation = {});
+
+}  // namespace haarlight
