@@ -9,9 +9,9 @@ namespace haarlight {
 /// Looks along -Z of its own frame with +X right and +Y up, as glTF's cameras do. `orientation`
 /// takes directions of that frame to the world.
 struct Camera {
-  Vec3 position;               ///< metres
-  Rotation orientation;        ///< columns are right, up, backwards in the world
-  double vertical_fov = 0.7;   ///< radians, in (0, pi)
+  Vec3 position;                  ///< metres
+  Rotation orientation;           ///< columns are right, up, backwards in the world
+  double vertical_fov = 0.7;      ///< radians, in (0, pi)
   int width = 512, height = 512;  ///< pixels
 
   /// Unit direction through a place in the picture: (x, y) in pixels, the middle of the top left
@@ -29,13 +29,14 @@ struct Camera {
 inline Camera look_at(const Vec3& position, const Vec3& target, double vertical_fov, int width,
                       int height) {
   const Vec3 back = normalize(position - target);
-  const Vec3 up_hint = std::abs(back.y) > 0.9999 ? Vec3{0, 0, back.y > 0 ? -1.0 : 1.0} : Vec3{0, 1, 0};
+  const Vec3 up_hint =
+      std::abs(back.y) > 0.9999 ? Vec3{0, 0, back.y > 0 ? -1.0 : 1.0} : Vec3{0, 1, 0};
   const Vec3 right = normalize(cross(up_hint, back));
   const Vec3 up = cross(back, right);
   Camera camera;
   camera.position = position;
-  camera.orientation = Rotation{{Vec3{right.x, up.x, back.x}, Vec3{right.y, up.y, back.y},
-                                 Vec3{right.z, up.z, back.z}}};
+  camera.orientation = Rotation{
+      {Vec3{right.x, up.x, back.x}, Vec3{right.y, up.y, back.y}, Vec3{right.z, up.z, back.z}}};
   camera.vertical_fov = vertical_fov;
   camera.width = width;
   camera.height = height;

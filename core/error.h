@@ -17,8 +17,8 @@ enum class ErrorKind {
 };
 
 /// Every failure the library reports. what() is one line without a final period or newline that
-/// says what, where and what was wanted: "a.exr: 12 of 131072 pixels are not finite, expected none".
-/// The library never prints and never exits.
+/// says what, where and what was wanted: "a.exr: 12 of 131072 pixels are not finite, expected
+/// none". The library never prints and never exits.
 class Error : public std::runtime_error {
  public:
   Error(ErrorKind kind, const std::string& message) : std::runtime_error(message), kind_(kind) {}

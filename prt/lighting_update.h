@@ -1,4 +1,5 @@
-// A frame's change of lighting, as a plain value: all that the deciding half tells the applying half.
+// A frame's change of lighting, as a plain value: all that the deciding half tells the applying
+// half.
 
 #pragma once
 

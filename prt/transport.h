@@ -1,5 +1,6 @@
 // Precomputed light transport T: rows x coefficients, block-sparse and 8-bit, read-only.
-// docs/transport_format.md gives the bytes; prt/transport_writer.h makes it; prt/row_sums.h uses it.
+// docs/transport_format.md gives the bytes; prt/transport_writer.h makes it; prt/row_sums.h uses
+// it.
 
 #pragma once
 

@@ -22,11 +22,11 @@ std::vector<std::uint32_t> image_row_order(int width, int height);
 /// One tile of exact rows as precomputation makes them: Haar coefficients of
 ///   t[k] = integral over texel k of V f_r cos dw   (f_r without the row's colour if grey).
 struct TileRows {
-  unsigned rgb_blocks = 0;     ///< bit b: block b of the tile has three channels
-  std::vector<float> values;   ///< [channel][row][coefficient]; 1 channel (kTileRows rows) when
-                               ///< rgb_blocks == 0, else 3, grey blocks using channel 0 only
-  std::vector<Rgb> color;      ///< kTileRows: albedo of grey rows; {1,1,1} for rows of RGB blocks
-  std::vector<float> coverage; ///< kTileRows: share of the pixel covered by the scene
+  unsigned rgb_blocks = 0;      ///< bit b: block b of the tile has three channels
+  std::vector<float> values;    ///< [channel][row][coefficient]; 1 channel (kTileRows rows) when
+                                ///< rgb_blocks == 0, else 3, grey blocks using channel 0 only
+  std::vector<Rgb> color;       ///< kTileRows: albedo of grey rows; {1,1,1} for rows of RGB blocks
+  std::vector<float> coverage;  ///< kTileRows: share of the pixel covered by the scene
 };
 
 /// Finds how small an entry may be dropped, from a few pilot tiles, so that the relative error of
@@ -37,8 +37,8 @@ class ToleranceTuner {
  public:
   ToleranceTuner(const HaarLayout& layout, double error);
   ~ToleranceTuner();
-  void add(const TileRows& tile);          ///< not thread-safe
-  std::vector<float> thresholds() const;   ///< per band; all 0 when error == 0 or no light falls
+  void add(const TileRows& tile);         ///< not thread-safe
+  std::vector<float> thresholds() const;  ///< per band; all 0 when error == 0 or no light falls
  private:
   struct State;
   std::unique_ptr<State> state_;
@@ -65,7 +65,7 @@ class TransportWriter {
   int tile_count() const;
   /// The outputs of a tile's rows: kTileRows entries of image_row_order.
   std::span<const std::uint32_t> tile_outputs(int tile) const;
-  bool has_tile(int tile) const;  ///< already in the journal
+  bool has_tile(int tile) const;                    ///< already in the journal
   void write_tile(int tile, const TileRows& rows);  ///< thread-safe; compresses outside the lock
 
   /// Assembles, checksums and renames. Tiles never written are empty. `meta` is the JSON object

@@ -76,8 +76,8 @@ class EnvironmentSampler {
 
  private:
   struct Cell {
-    float x, y, z;     // unit direction, the centre
-    float r, g, b;     // radiance x solid angle
+    float x, y, z;  // unit direction, the centre
+    float r, g, b;  // radiance x solid angle
     float solid_angle;
   };
   int n_;

@@ -33,10 +33,10 @@ class HaarLayout {
   explicit HaarLayout(int face_size);
 
   int face_size() const { return face_size_; }
-  int band_count() const { return band_count_; }             ///< max(1, log2 n)
-  int size() const { return 6 * face_size_ * face_size_; }   ///< number of coefficients
-  IndexRange band(int b) const;  ///< requires 0 <= b < band_count()
-  int band_of(int index) const;  ///< requires 0 <= index < size()
+  int band_count() const { return band_count_; }            ///< max(1, log2 n)
+  int size() const { return 6 * face_size_ * face_size_; }  ///< number of coefficients
+  IndexRange band(int b) const;                             ///< requires 0 <= b < band_count()
+  int band_of(int index) const;                             ///< requires 0 <= index < size()
   /// Texels under a wavelet (or scaling function) of band b: n^2 / 4^b.
   int area(int b) const;
 

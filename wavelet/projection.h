@@ -13,9 +13,9 @@ namespace haarlight {
 /// All three look from inside with front = -Z in the middle, right = +X, up = +Y, nothing mirrored.
 /// (u, v) run over the whole picture in [0, 1], u to the right, v down.
 enum class Projection {
-  latlong,         ///< width = 2 height. Middle -Z, u = 3/4 is +X, left and right border +Z, top +Y.
-  angular,         ///< square. Debevec light probe: middle -Z, rim +Z, distance from the middle is
-                   ///< angle / pi. Pixels outside the disc carry nothing.
+  latlong,  ///< width = 2 height. Middle -Z, u = 3/4 is +X, left and right border +Z, top +Y.
+  angular,  ///< square. Debevec light probe: middle -Z, rim +Z, distance from the middle is
+            ///< angle / pi. Pixels outside the disc carry nothing.
   vertical_cross,  ///< 3 faces wide, 4 high. Row 0: +Y; row 1: -X, -Z, +X; row 2: -Y; row 3: +Z
                    ///< (upside down, as the cross folds).
 };
