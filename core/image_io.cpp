@@ -1,0 +1,182 @@
+// Reading and writing picture files, through OpenImageIO.
+
+#include "core/image_io.h"
+
+#include <OpenImageIO/imageio.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "core/atomic_file.h"
+#include "core/error.h"
+
+namespace haarlight {
+namespace {
+
+namespace fs = std::filesystem;
+
+static_assert(sizeof(Rgb) == 3 * sizeof(float), "pixels are handed over as packed floats");
+
+/// A header can promise any size; this many pixels (16384 x 16384) is more than any light probe
+/// and little enough to allocate.
+constexpr std::int64_t kMostPixels = std::int64_t{1} << 28;
+
+/// OpenImageIO's messages may have several lines and an end of line.
+std::string one_line(std::string text) {
+  std::replace(text.begin(), text.end(), '\r', ' ');
+  std::size_t at = 0;
+  while ((at = text.find('\n')) != std::string::npos) text.replace(at, 1, "; ");
+  while (!text.empty() && (text.back() == ' ' || text.back() == ';' || text.back() == '.')) {
+    text.pop_back();
+  }
+  return text.empty() ? "no reason given" : text;
+}
+
+[[noreturn]] void fail(ErrorKind kind, const fs::path& file, const std::string& what) {
+  throw Error(kind, fmt::format("{}: {}", file.string(), what));
+}
+
+float linear_from_srgb(float encoded) {
+  return encoded <= 0.04045f ? encoded / 12.92f
+                             : static_cast<float>(std::pow((encoded + 0.055) / 1.055, 2.4));
+}
+
+/// The nearest of 256 steps. A NaN fails both comparisons and becomes 0.
+std::uint8_t srgb_byte(float linear) {
+  if (!(linear > 0)) return 0;
+  if (!(linear < 1)) return 255;
+  const double encoded = linear <= 0.0031308
+                             ? 12.92 * static_cast<double>(linear)
+                             : 1.055 * std::pow(static_cast<double>(linear), 1 / 2.4) - 0.055;
+  return static_cast<std::uint8_t>(std::lround(255 * encoded));
+}
+
+/// Refuses early, with the system's reason, what OpenImageIO would only call unreadable.
+void check_readable(const fs::path& file) {
+  std::error_code error;
+  const fs::file_status status = fs::status(file, error);
+  if (status.type() == fs::file_type::not_found) {
+    fail(ErrorKind::missing, file, "no such file, expected a picture");
+  }
+  if (error) fail(ErrorKind::io, file, "cannot read: " + error.message());
+  if (fs::is_directory(status)) fail(ErrorKind::format, file, "is a folder, expected a picture");
+  if (::access(file.c_str(), R_OK) != 0) {
+    fail(ErrorKind::io, file, "cannot read: " + std::generic_category().message(errno));
+  }
+}
+
+void check_shape(const fs::path& file, const OIIO::ImageSpec& spec) {
+  if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1 || spec.depth > 1 || spec.deep) {
+    fail(ErrorKind::format, file,
+         fmt::format("has {}x{}x{} pixels of {} channels{}, expected one flat picture", spec.width,
+                     spec.height, spec.depth, spec.nchannels, spec.deep ? " in deep samples" : ""));
+  }
+  if (std::int64_t{spec.width} * spec.height > kMostPixels) {
+    fail(ErrorKind::format, file,
+         fmt::format("has {}x{} pixels, expected at most {} in all", spec.width, spec.height,
+                     kMostPixels));
+  }
+}
+
+void write_float_picture(const fs::path& temporary, const fs::path& file, const Image& image,
+                         bool with_compression) {
+  OIIO::ImageSpec spec(image.width, image.height, 3, OIIO::TypeDesc::FLOAT);
+  if (with_compression) spec.attribute("compression", "zip");
+  auto output = OIIO::ImageOutput::create(temporary.string());
+  if (!output) fail(ErrorKind::io, file, "cannot write: " + one_line(OIIO::geterror()));
+  if (!output->open(temporary.string(), spec) ||
+      !output->write_image(OIIO::TypeDesc::FLOAT, image.pixels.data()) || !output->close()) {
+    fail(ErrorKind::io, file, "cannot write: " + one_line(output->geterror()));
+  }
+}
+
+void write_png(const fs::path& temporary, const fs::path& file, const Image& image) {
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(3 * image.pixels.size());
+  for (const Rgb& pixel : image.pixels) {
+    bytes.push_back(srgb_byte(pixel.r));
+    bytes.push_back(srgb_byte(pixel.g));
+    bytes.push_back(srgb_byte(pixel.b));
+  }
+  OIIO::ImageSpec spec(image.width, image.height, 3, OIIO::TypeDesc::UINT8);
+  spec.attribute("oiio:ColorSpace", "sRGB");
+  auto output = OIIO::ImageOutput::create(temporary.string());
+  if (!output) fail(ErrorKind::io, file, "cannot write: " + one_line(OIIO::geterror()));
+  if (!output->open(temporary.string(), spec) ||
+      !output->write_image(OIIO::TypeDesc::UINT8, bytes.data()) || !output->close()) {
+    fail(ErrorKind::io, file, "cannot write: " + one_line(output->geterror()));
+  }
+}
+
+}  // namespace
+
+Image load_image(const fs::path& file) {
+  check_readable(file);
+  // Colours must come as they are stored: a texture's alpha is no reason to darken them.
+  OIIO::ImageSpec hints;
+  hints.attribute("oiio:UnassociatedAlpha", 1);
+  auto input = OIIO::ImageInput::open(file.string(), &hints);
+  if (!input) {
+    fail(ErrorKind::format, file, "is no readable picture: " + one_line(OIIO::geterror()));
+  }
+  const OIIO::ImageSpec spec = input->spec();
+  check_shape(file, spec);
+
+  Image image(spec.width, spec.height);
+  bool complete = true;
+  if (spec.nchannels >= 3) {
+    complete = input->read_image(0, 0, 0, 3, OIIO::TypeDesc::FLOAT, image.pixels.data());
+  } else {
+    std::vector<float> grey(image.pixels.size());
+    complete = input->read_image(0, 0, 0, 1, OIIO::TypeDesc::FLOAT, grey.data());
+    std::transform(grey.begin(), grey.end(), image.pixels.begin(),
+                   [](float value) { return Rgb(value, value, value); });
+  }
+  // Some readers report success for scanlines that are not there, and only leave a message.
+  if (!complete || input->has_error()) {
+    fail(ErrorKind::format, file, "is cut short or damaged: " + one_line(input->geterror()));
+  }
+  if (!spec.format.is_floating_point()) {
+    for (Rgb& pixel : image.pixels) {
+      pixel = {linear_from_srgb(pixel.r), linear_from_srgb(pixel.g), linear_from_srgb(pixel.b)};
+    }
+  }
+  return image;
+}
+
+void save_image(const fs::path& file, const Image& image) {
+  std::string suffix = file.extension().string();
+  std::transform(suffix.begin(), suffix.end(), suffix.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  if (suffix != ".exr" && suffix != ".hdr" && suffix != ".png") {
+    fail(ErrorKind::invalid_argument, file,
+         fmt::format("suffix is \"{}\", expected .exr, .hdr or .png", suffix));
+  }
+  if (image.width < 1 || image.height < 1 ||
+      image.pixels.size() !=
+          static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height)) {
+    fail(ErrorKind::invalid_argument, file,
+         fmt::format("picture to write is {}x{} with {} pixels, expected width x height, not zero",
+                     image.width, image.height, image.pixels.size()));
+  }
+  write_atomically(file, [&](const fs::path& temporary) {
+    if (suffix == ".png") {
+      write_png(temporary, file, image);
+    } else {
+      write_float_picture(temporary, file, image, suffix == ".exr");
+    }
+  });
+}
+
+}  // namespace haarlight
