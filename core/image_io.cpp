@@ -92,6 +92,8 @@ void write_float_picture(const fs::path& temporary, const fs::path& file, const 
                          bool with_compression) {
   OIIO::ImageSpec spec(image.width, image.height, 3, OIIO::TypeDesc::FLOAT);
   if (with_compression) spec.attribute("compression", "zip");
+  // EXR would be stamped with the time of writing, and equal pictures would differ as files.
+  spec.attribute("DateTime", "2000:01:01 00:00:00");
   auto output = OIIO::ImageOutput::create(temporary.string());
   if (!output) fail(ErrorKind::io, file, "cannot write: " + one_line(OIIO::geterror()));
   if (!output->open(temporary.string(), spec) ||
