@@ -24,7 +24,7 @@ struct Lamp {
 // Warm spots under the ceiling, two strong work lights and a cool one by the door. Directions are
 // far from each other, so that turning the room changes every shadow.
 constexpr std::array<Lamp, 9> kLamps{{
-    {{2.3, 2.55, 1.9}, 1.0, {5200, 4300, 3000}},
+    {{2.3, 2.55, 1.9}, 1.0, {3700, 3050, 2150}},
     {{-1.9, 2.50, 2.6}, 0.9, {2600, 2000, 1250}},
     {{-2.8, 2.60, -2.4}, 0.8, {2300, 1900, 1300}},
     {{1.3, 2.60, -3.4}, 1.1, {1150, 900, 580}},
@@ -72,7 +72,7 @@ struct Surface {
 
 RgbD sky_at_dusk(const Vec3& d) {
   const double height = std::clamp(d.y * 2.2 + 0.35, 0.0, 1.0);
-  return RgbD{15.0, 10.3, 7.0} * (1 - height) + RgbD{7.0, 10.0, 15.8} * height;
+  return RgbD{21.0, 14.5, 9.8} * (1 - height) + RgbD{10.0, 14.0, 22.0} * height;
 }
 
 // Three tall windows with bars.
@@ -144,7 +144,7 @@ Surface surface_at(const WallHit& hit, const Vec3& d, std::uint64_t seed) {
       const bool frame = p.z < -0.67 || p.z > 0.17 || p.y > 0.67;
       if (frame) return {{0.30, 0.28, 0.25}, {}};
       const double depth = 0.75 + 0.25 * std::sin(3 * p.y + 1);
-      return {{}, RgbD{2.6, 1.75, 0.95} * depth};
+      return {{}, RgbD{4.2, 2.85, 1.55} * depth};
     }
     if (inside(p.z, -4.6, -2.2) && inside(p.y, -0.4, 1.3)) {
       return picture((p.z + 3.4) / 1.2, (p.y - 0.45) / 0.85, 1);
@@ -195,7 +195,7 @@ RgbD irradiance(const WallHit& hit) {
   const double square = dot(to_window, to_window) + 3.0;
   const double facing = std::max(0.0, -to_window.x) / std::sqrt(square);
   const double cosine = std::max(0.0, dot(to_window, hit.normal)) / std::sqrt(square);
-  return sum + RgbD{10.0, 10.0, 10.9} * (8.0 * facing * cosine / square);
+  return sum + RgbD{14.0, 14.0, 15.3} * (8.0 * facing * cosine / square);
 }
 
 }  // namespace
