@@ -4,6 +4,7 @@
 
 #pragma once
 
+#include <array>
 #include <optional>
 #include <span>
 #include <string>
@@ -80,19 +81,24 @@ class LightingTracker {
 
  private:
   void check_target(std::span<const Rgb> target) const;
-  void choose_bands_exhaustively();
-  void emit(std::span<const Rgb> target);
+  void rank(std::span<const Rgb> target);
+  BandMask choose_bands_simply() const;
+  BandMask choose_bands_exhaustively();
+  void show(std::span<const Rgb> target, int index);
 
   HaarLayout layout_;
   LightingOptions options_;
   std::vector<float> weights_;
   std::vector<Rgb> shown_;
   LightingUpdate update_;
-  // Scratch: ranking keys of both choices, and of the choice made.
-  std::vector<float> keep_key_, reset_key_;
+
+  // Scratch of one frame, all reused.
+  std::vector<float> keep_key_, reset_key_;  // weight * |D| for either choice
+  std::array<double, HaarLayout::kMaxBands> keep_norm_{}, reset_norm_{}, shown_norm_{};
+  std::vector<float> key_;  // of the choice made
   std::vector<int> chosen_;
   TopK top_k_;
-  struct BandScratch;
+  std::vector<std::vector<float>> sorted_keys_;  // exhaustive: [band * 2 + choice], descending
   std::vector<int> band_chosen_;
 };
 

@@ -1,0 +1,267 @@
+// NWA, BI and PBI: which wavelets change in a frame.
+
+#include "prt/lighting_tracker.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "core/error.h"
+
+namespace haarlight {
+namespace {
+
+constexpr float kLargestRadiance = 1.8e18f;  // its square is still a float
+
+constexpr std::pair<LightingMethod, const char*> kMethodNames[] = {
+    {LightingMethod::nwa, "nwa"},
+    {LightingMethod::bi, "bi"},
+    {LightingMethod::pbi, "pbi"},
+    {LightingMethod::reference, "reference"}};
+
+void check_options(const HaarLayout& layout, const LightingOptions& options) {
+  if (options.wavelets < 1) {
+    throw Error(ErrorKind::invalid_argument,
+                fmt::format("wavelets is {}, expected at least 1", options.wavelets));
+  }
+  if (options.weights.empty()) return;
+  if (options.weights.size() != static_cast<std::size_t>(layout.size())) {
+    throw Error(ErrorKind::invalid_argument,
+                fmt::format("weights has {} entries, expected {} (6*{}*{}) or none",
+                            options.weights.size(), layout.size(), layout.face_size(),
+                            layout.face_size()));
+  }
+  for (std::size_t i = 0; i < options.weights.size(); ++i) {
+    if (!(options.weights[i] >= 0) || !std::isfinite(options.weights[i])) {
+      throw Error(ErrorKind::invalid_argument,
+                  fmt::format("weights[{}] is {}, expected a finite number >= 0", i,
+                              options.weights[i]));
+    }
+  }
+}
+
+RgbD difference(const Rgb& to, const Rgb& from) { return RgbD(to) - RgbD(from); }
+
+}  // namespace
+
+std::optional<LightingMethod> lighting_method_from_name(std::string_view name) {
+  for (const auto& [method, text] : kMethodNames) {
+    if (name == text) return method;
+  }
+  return std::nullopt;
+}
+
+std::string lighting_method_name(LightingMethod method) {
+  for (const auto& [known, text] : kMethodNames) {
+    if (known == method) return text;
+  }
+  return "unknown";
+}
+
+std::vector<float> area_weights(const HaarLayout& layout) {
+  std::vector<float> weights(static_cast<std::size_t>(layout.size()));
+  for (int b = 0; b < layout.band_count(); ++b) {
+    const IndexRange range = layout.band(b);
+    // Areas are powers of four, so the root is exact.
+    std::fill(weights.begin() + range.begin, weights.begin() + range.end,
+              std::sqrt(static_cast<float>(layout.area(b))));
+  }
+  return weights;
+}
+
+LightingTracker::LightingTracker(const HaarLayout& layout, LightingOptions options)
+    : layout_(layout) {
+  set_options(std::move(options));
+  const auto size = static_cast<std::size_t>(layout.size());
+  shown_.resize(size);
+  keep_key_.resize(size);
+  reset_key_.resize(size);
+  key_.resize(size);
+  sorted_keys_.resize(2 * static_cast<std::size_t>(layout.band_count()));
+}
+
+void LightingTracker::set_options(LightingOptions options) {
+  check_options(layout_, options);
+  weights_ = options.weights.empty() ? area_weights(layout_) : options.weights;
+  options_ = std::move(options);
+}
+
+void LightingTracker::check_target(std::span<const Rgb> target) const {
+  if (target.size() != static_cast<std::size_t>(layout_.size())) {
+    throw Error(ErrorKind::invalid_argument,
+                fmt::format("target lighting has {} coefficients, expected {} (6*{}*{})",
+                            target.size(), layout_.size(), layout_.face_size(),
+                            layout_.face_size()));
+  }
+  for (std::size_t i = 0; i < target.size(); ++i) {
+    // One comparison catches NaN, infinity and size.
+    const Rgb& c = target[i];
+    if (!(std::max({std::abs(c.r), std::abs(c.g), std::abs(c.b)}) <= kLargestRadiance) ||
+        !is_finite(c)) {
+      throw Error(ErrorKind::invalid_argument,
+                  fmt::format("target lighting coefficient {} is ({}, {}, {}), expected finite "
+                              "values up to {}",
+                              i, c.r, c.g, c.b, kLargestRadiance));
+    }
+  }
+}
+
+// Keys and band norms of keeping and of resetting, in one pass over the lighting.
+void LightingTracker::rank(std::span<const Rgb> target) {
+  for (int b = 0; b < layout_.band_count(); ++b) {
+    const IndexRange range = layout_.band(b);
+    double keep = 0, reset = 0, shown = 0;
+    for (int i = range.begin; i < range.end; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      // Float differences are nonzero exactly when the values differ, which is all that ranking
+      // and convergence need; the deltas themselves are taken in double.
+      keep_key_[k] = weights_[k] * l1_norm(target[k] - shown_[k]);
+      reset_key_[k] = weights_[k] * l1_norm(target[k]);
+      keep += static_cast<double>(keep_key_[k]);
+      reset += static_cast<double>(reset_key_[k]);
+      shown += static_cast<double>(l1_norm(shown_[k]));
+    }
+    const auto band = static_cast<std::size_t>(b);
+    keep_norm_[band] = keep;
+    reset_norm_[band] = reset;
+    shown_norm_[band] = shown;
+  }
+}
+
+// Overbeck 2006, 5.2.2: incremental if || L_new - L_shown ||_1 < || L_new ||_1.
+BandMask LightingTracker::choose_bands_simply() const {
+  BandMask reset;
+  for (std::size_t b = 0; b < static_cast<std::size_t>(layout_.band_count()); ++b) {
+    reset[b] = shown_norm_[b] > 0 && !(keep_norm_[b] < reset_norm_[b]);
+  }
+  return reset;
+}
+
+// Overbeck 2006, 5.2.1: the error left by a combination is the sum of all keys less the largest
+// `wavelets` of them; every band and choice is sorted once, every combination merges.
+BandMask LightingTracker::choose_bands_exhaustively() {
+  const auto bands = static_cast<std::size_t>(layout_.band_count());
+  unsigned resettable = 0;
+  for (std::size_t b = 0; b < bands; ++b) {
+    const IndexRange range = layout_.band(static_cast<int>(b));
+    for (std::size_t choice = 0; choice < 2; ++choice) {
+      const std::vector<float>& keys = choice ? reset_key_ : keep_key_;
+      const std::span<const float> band_keys(keys.data() + range.begin,
+                                             static_cast<std::size_t>(range.size()));
+      top_k_.select(band_keys, options_.wavelets, band_chosen_);
+      std::vector<float>& sorted = sorted_keys_[2 * b + choice];
+      sorted.clear();
+      for (int i : band_chosen_) sorted.push_back(band_keys[static_cast<std::size_t>(i)]);
+      std::sort(sorted.begin(), sorted.end(), std::greater<>());
+    }
+    if (shown_norm_[b] > 0) resettable |= 1u << b;
+  }
+  unsigned best = 0;
+  double least = 0;
+  for (unsigned mask = 0; mask < (1u << bands); ++mask) {
+    if (mask & ~resettable) continue;
+    double error = 0;
+    std::array<std::size_t, HaarLayout::kMaxBands> next{};
+    for (std::size_t b = 0; b < bands; ++b) error += mask >> b & 1 ? reset_norm_[b] : keep_norm_[b];
+    for (int taken = 0; taken < options_.wavelets; ++taken) {
+      float largest = 0;
+      std::size_t from = bands;
+      for (std::size_t b = 0; b < bands; ++b) {
+        const std::vector<float>& sorted = sorted_keys_[2 * b + (mask >> b & 1)];
+        if (next[b] < sorted.size() && sorted[next[b]] > largest) {
+          largest = sorted[next[b]];
+          from = b;
+        }
+      }
+      if (from == bands) break;
+      ++next[from];
+      error -= static_cast<double>(largest);
+    }
+    if (mask == 0 || error < least) {
+      least = error;
+      best = mask;
+    }
+  }
+  return BandMask(best);
+}
+
+void LightingTracker::show(std::span<const Rgb> target, int index) {
+  const auto k = static_cast<std::size_t>(index);
+  update_.deltas.push_back({index, difference(target[k], shown_[k])});
+  shown_[k] = target[k];
+}
+
+const LightingUpdate& LightingTracker::advance(std::span<const Rgb> target) {
+  check_target(target);
+  update_.reset.reset();
+  update_.deltas.clear();
+
+  if (options_.method == LightingMethod::reference) {
+    for (int i = 0; i < layout_.size(); ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      if (!(target[k] == shown_[k])) show(target, i);
+    }
+    return update_;
+  }
+
+  // Decide band by band: keep what is shown, or start the band anew (Figure 6, lines 1-4).
+  rank(target);
+  const auto bands = static_cast<std::size_t>(layout_.band_count());
+  if (options_.method == LightingMethod::nwa) {
+    for (std::size_t b = 0; b < bands; ++b) update_.reset[b] = true;
+  } else if (options_.method == LightingMethod::pbi) {
+    update_.reset = options_.band_choice == BandChoice::simple ? choose_bands_simply()
+                                                               : choose_bands_exhaustively();
+  }
+
+  // Forget the reset bands (line 14) and pick wavelets over all bands together (line 3).
+  for (std::size_t b = 0; b < bands; ++b) {
+    const IndexRange range = layout_.band(static_cast<int>(b));
+    const std::vector<float>& from = update_.reset[b] ? reset_key_ : keep_key_;
+    std::copy(from.begin() + range.begin, from.begin() + range.end, key_.begin() + range.begin);
+    if (update_.reset[b]) {
+      std::fill(shown_.begin() + range.begin, shown_.begin() + range.end, Rgb{});
+    }
+  }
+  top_k_.select(key_, options_.wavelets, chosen_);
+
+  // Bring the chosen ones up to date (lines 8-11 and 15-18; Eqs. 5 and 6).
+  for (int index : chosen_) show(target, index);
+  return update_;
+}
+
+const LightingUpdate& LightingTracker::start_exact(std::span<const Rgb> target) {
+  check_target(target);
+  update_.reset.reset();
+  update_.deltas.clear();
+  for (int b = 0; b < layout_.band_count(); ++b) update_.reset[static_cast<std::size_t>(b)] = true;
+  std::fill(shown_.begin(), shown_.end(), Rgb{});
+  for (int i = 0; i < layout_.size(); ++i) {
+    if (!(target[static_cast<std::size_t>(i)] == Rgb{})) show(target, i);
+  }
+  return update_;
+}
+
+double lighting_error(const HaarLayout& layout, std::span<const Rgb> shown,
+                      std::span<const Rgb> target) {
+  double error = 0, norm = 0;
+  for (int b = 0; b < layout.band_count(); ++b) {
+    const IndexRange range = layout.band(b);
+    double band_error = 0, band_norm = 0;
+    for (int i = range.begin; i < range.end; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      band_error += l1_norm(difference(target[k], shown[k]));
+      band_norm += static_cast<double>(l1_norm(target[k]));
+    }
+    const double weight = std::sqrt(layout.area(b));
+    error += weight * band_error;
+    norm += weight * band_norm;
+  }
+  if (norm > 0) return error / norm;
+  return error > 0 ? 1.0 : 0.0;
+}
+
+}  // namespace haarlight

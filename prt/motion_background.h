@@ -1,0 +1,20 @@
+// What is seen behind the scene while the light moves.
+
+#pragma once
+
+#include "core/image.h"
+#include "prt/motion.h"
+#include "prt/transport.h"
+#include "wavelet/environment.h"
+
+namespace haarlight {
+
+/// Draws the light of a frame of a motion where the scene does not cover `picture`: the environment
+/// turned for rotate, tumble and swing, the blend of both for blend, the dimmed environment with
+/// the disc for light. `to` is the second environment of blend, which must be there for it.
+/// `picture` is transport.width() x transport.height(). Throws Error{invalid_argument} otherwise.
+void composite_motion_background(const Transport& transport, const MotionOptions& options,
+                                 int frame, const Environment& from, const Environment* to,
+                                 Image& picture);
+
+}  // namespace haarlight
