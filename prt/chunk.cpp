@@ -84,7 +84,8 @@ std::string check_chunk(const HaarLayout& layout, std::span<const std::byte> chu
   const auto columns = static_cast<std::size_t>(layout.size());
   const std::size_t area = column_area_begin(columns);
   if (chunk.size() < area || chunk.size() % 16 != 0) {
-    return fmt::format("chunk of {} bytes, expected at least {} in steps of 16", chunk.size(), area);
+    return fmt::format("chunk of {} bytes, expected at least {} in steps of 16", chunk.size(),
+                       area);
   }
   std::uint64_t rgb[4];
   std::memcpy(rgb, chunk.data(), sizeof rgb);

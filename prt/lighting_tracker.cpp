@@ -29,16 +29,16 @@ void check_options(const HaarLayout& layout, const LightingOptions& options) {
   }
   if (options.weights.empty()) return;
   if (options.weights.size() != static_cast<std::size_t>(layout.size())) {
-    throw Error(ErrorKind::invalid_argument,
-                fmt::format("weights has {} entries, expected {} (6*{}*{}) or none",
-                            options.weights.size(), layout.size(), layout.face_size(),
-                            layout.face_size()));
+    throw Error(
+        ErrorKind::invalid_argument,
+        fmt::format("weights has {} entries, expected {} (6*{}*{}) or none", options.weights.size(),
+                    layout.size(), layout.face_size(), layout.face_size()));
   }
   for (std::size_t i = 0; i < options.weights.size(); ++i) {
     if (!(options.weights[i] >= 0) || !std::isfinite(options.weights[i])) {
-      throw Error(ErrorKind::invalid_argument,
-                  fmt::format("weights[{}] is {}, expected a finite number >= 0", i,
-                              options.weights[i]));
+      throw Error(
+          ErrorKind::invalid_argument,
+          fmt::format("weights[{}] is {}, expected a finite number >= 0", i, options.weights[i]));
     }
   }
 }
@@ -77,6 +77,7 @@ LightingTracker::LightingTracker(const HaarLayout& layout, LightingOptions optio
   set_options(std::move(options));
   const auto size = static_cast<std::size_t>(layout.size());
   shown_.resize(size);
+  emitted_.resize(size);
   keep_key_.resize(size);
   reset_key_.resize(size);
   key_.resize(size);
@@ -91,10 +92,10 @@ void LightingTracker::set_options(LightingOptions options) {
 
 void LightingTracker::check_target(std::span<const Rgb> target) const {
   if (target.size() != static_cast<std::size_t>(layout_.size())) {
-    throw Error(ErrorKind::invalid_argument,
-                fmt::format("target lighting has {} coefficients, expected {} (6*{}*{})",
-                            target.size(), layout_.size(), layout_.face_size(),
-                            layout_.face_size()));
+    throw Error(
+        ErrorKind::invalid_argument,
+        fmt::format("target lighting has {} coefficients, expected {} (6*{}*{})", target.size(),
+                    layout_.size(), layout_.face_size(), layout_.face_size()));
   }
   for (std::size_t i = 0; i < target.size(); ++i) {
     // One comparison catches NaN, infinity and size.
@@ -190,7 +191,11 @@ BandMask LightingTracker::choose_bands_exhaustively() {
 
 void LightingTracker::show(std::span<const Rgb> target, int index) {
   const auto k = static_cast<std::size_t>(index);
-  update_.deltas.push_back({index, difference(target[k], shown_[k])});
+  // Against what was really handed out, so that a rounded delta (a coefficient that fell by more
+  // than 2^29) is made good by the next one instead of staying for ever.
+  const RgbD delta = RgbD(target[k]) - emitted_[k];
+  update_.deltas.push_back({index, delta});
+  emitted_[k] += delta;
   shown_[k] = target[k];
 }
 
@@ -224,6 +229,7 @@ const LightingUpdate& LightingTracker::advance(std::span<const Rgb> target) {
     std::copy(from.begin() + range.begin, from.begin() + range.end, key_.begin() + range.begin);
     if (update_.reset[b]) {
       std::fill(shown_.begin() + range.begin, shown_.begin() + range.end, Rgb{});
+      std::fill(emitted_.begin() + range.begin, emitted_.begin() + range.end, RgbD{});
     }
   }
   top_k_.select(key_, options_.wavelets, chosen_);
@@ -239,6 +245,7 @@ const LightingUpdate& LightingTracker::start_exact(std::span<const Rgb> target) 
   update_.deltas.clear();
   for (int b = 0; b < layout_.band_count(); ++b) update_.reset[static_cast<std::size_t>(b)] = true;
   std::fill(shown_.begin(), shown_.end(), Rgb{});
+  std::fill(emitted_.begin(), emitted_.end(), RgbD{});
   for (int i = 0; i < layout_.size(); ++i) {
     if (!(target[static_cast<std::size_t>(i)] == Rgb{})) show(target, i);
   }

@@ -90,6 +90,8 @@ class LightingTracker {
   LightingOptions options_;
   std::vector<float> weights_;
   std::vector<Rgb> shown_;
+  std::vector<RgbD>
+      emitted_;  // sum of all deltas since the band was last reset, as consumers have it
   LightingUpdate update_;
 
   // Scratch of one frame, all reused.

@@ -14,7 +14,8 @@ namespace {
 
 // A number in [0, 1) from integers alone, the same everywhere (splitmix64's finaliser).
 double hash01(std::uint64_t a, std::uint64_t b = 0, std::uint64_t c = 0) {
-  std::uint64_t x = a * 0x9e3779b97f4a7c15ull + b * 0xbf58476d1ce4e5b9ull + c * 0x94d049bb133111ebull;
+  std::uint64_t x =
+      a * 0x9e3779b97f4a7c15ull + b * 0xbf58476d1ce4e5b9ull + c * 0x94d049bb133111ebull;
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
   x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
   return static_cast<double>((x ^ (x >> 31)) >> 11) * 0x1p-53;

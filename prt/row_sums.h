@@ -46,6 +46,10 @@ class RowSums {
   /// band's kept picture is allocated when first needed. Requires deltas ascending and in range.
   ApplyStats apply(const LightingUpdate& update, const ChunkDone& done = {});
 
+  /// Whether single bands will be reset (true from the start). A caller whose bands never are (bi,
+  /// reference) says no, and no band's log is folded: no kept pictures, and no time for them.
+  void expect_resets(bool expected);
+
   const Transport& transport() const;
   /// All totals: rows() * 3 values, [block][channel][row of block].
   std::span<const double> totals() const;

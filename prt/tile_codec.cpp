@@ -70,12 +70,12 @@ CompressedTile compress_tile(const HaarLayout& layout, const TileRows& rows,
   if (rows.values.size() != channels * kRows * size || rows.color.size() != kRows ||
       rows.coverage.size() != kRows || rows.rgb_blocks > 15 ||
       thresholds.size() != static_cast<std::size_t>(layout.band_count())) {
-    throw Error(ErrorKind::invalid_argument,
-                fmt::format("tile has {} values, {} colours, {} coverages, block mask {} and {} "
-                            "thresholds, expected {}, {}, {}, at most 15 and {}",
-                            rows.values.size(), rows.color.size(), rows.coverage.size(),
-                            rows.rgb_blocks, thresholds.size(), channels * kRows * size, kRows,
-                            kRows, layout.band_count()));
+    throw Error(
+        ErrorKind::invalid_argument,
+        fmt::format("tile has {} values, {} colours, {} coverages, block mask {} and {} "
+                    "thresholds, expected {}, {}, {}, at most 15 and {}",
+                    rows.values.size(), rows.color.size(), rows.coverage.size(), rows.rgb_blocks,
+                    thresholds.size(), channels * kRows * size, kRows, kRows, layout.band_count()));
   }
   CompressedTile tile;
   tile.rgb_blocks = rows.rgb_blocks;
@@ -113,8 +113,8 @@ CompressedTile compress_tile(const HaarLayout& layout, const TileRows& rows,
           // A peak too small for a normal scale is nothing.
           if (peak < 1e-30f || energy < floor_energy) continue;
           const std::size_t column = begin + c;
-          tile.present[column / 2] = static_cast<std::uint8_t>(
-              tile.present[column / 2] | (1u << (block + 4 * (column % 2))));
+          tile.present[column / 2] = static_cast<std::uint8_t>(tile.present[column / 2] |
+                                                               (1u << (block + 4 * (column % 2))));
           for (std::size_t ch = 0; ch < block_channels; ++ch) {
             quantise_block(rows.values.data() + (ch * kRows + block * kBlock) * size + column, size,
                            strips[block][ch].peak[c], tile);

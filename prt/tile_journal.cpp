@@ -100,10 +100,10 @@ TileJournal::TileJournal(const std::filesystem::path& file, const std::string& f
 
   try {
     JournalHeader found{};
-    const bool ours = resume &&
-                      read_all(descriptor_, reinterpret_cast<std::byte*>(&found), sizeof found, 0,
-                               file_) &&
-                      std::memcmp(&found, &header, sizeof header) == 0;
+    const bool ours =
+        resume &&
+        read_all(descriptor_, reinterpret_cast<std::byte*>(&found), sizeof found, 0, file_) &&
+        std::memcmp(&found, &header, sizeof header) == 0;
     if (ours) {
       scan();
     } else {
@@ -156,8 +156,8 @@ bool TileJournal::has(int tile) const {
 
 int TileJournal::count() const {
   const std::lock_guard lock(mutex_);
-  return static_cast<int>(std::count_if(places_.begin(), places_.end(),
-                                        [](const Place& p) { return p.size > 0; }));
+  return static_cast<int>(
+      std::count_if(places_.begin(), places_.end(), [](const Place& p) { return p.size > 0; }));
 }
 
 void TileJournal::append(int tile, const TileRecord& record) {

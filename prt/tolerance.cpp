@@ -113,8 +113,9 @@ struct ToleranceTuner::State {
 
 ToleranceTuner::ToleranceTuner(const HaarLayout& layout, double error) {
   if (!(error >= 0 && error < 1)) {
-    throw Error(ErrorKind::invalid_argument,
-                fmt::format("error is {}, expected a share of the picture from 0 to below 1", error));
+    throw Error(
+        ErrorKind::invalid_argument,
+        fmt::format("error is {}, expected a share of the picture from 0 to below 1", error));
   }
   state_ = std::make_unique<State>(layout, error);
 }
@@ -169,15 +170,15 @@ std::vector<float> ToleranceTuner::thresholds() const {
     double worst = 0;
     for (std::size_t l = 0; l < s.lightings.size(); ++l) {
       if (s.energies[l] > 0) {
-        worst = std::max(worst,
-                         std::sqrt(s.errors[l][static_cast<std::size_t>(i)] / s.energies[l]));
+        worst =
+            std::max(worst, std::sqrt(s.errors[l][static_cast<std::size_t>(i)] / s.energies[l]));
       }
     }
     if (worst > aim) break;
     level = i + 1;
   }
-  const bool anything = std::any_of(s.energies.begin(), s.energies.end(),
-                                    [](double e) { return e > 0; });
+  const bool anything =
+      std::any_of(s.energies.begin(), s.energies.end(), [](double e) { return e > 0; });
   // Everything up to bin level-1 may go: its upper border is threshold_of(level - 1).
   const double threshold = level > 0 && anything && s.error > 0 ? threshold_of(level - 1) : 0.0;
   return std::vector<float>(static_cast<std::size_t>(s.layout.band_count()),

@@ -58,9 +58,7 @@ class Mapping {
   Mapping(const Mapping&) = delete;
   Mapping& operator=(const Mapping&) = delete;
 
-  std::span<const std::byte> bytes() const {
-    return {static_cast<const std::byte*>(data_), size_};
-  }
+  std::span<const std::byte> bytes() const { return {static_cast<const std::byte*>(data_), size_}; }
 
  private:
   void* data_ = nullptr;
@@ -72,8 +70,9 @@ class Mapping {
 }
 
 // The bytes of a section, inside the file and with the right hash.
-std::span<const std::byte> section_bytes(std::span<const std::byte> file, const FileSection& section,
-                                         const std::string& name, const std::string& what) {
+std::span<const std::byte> section_bytes(std::span<const std::byte> file,
+                                         const FileSection& section, const std::string& name,
+                                         const std::string& what) {
   if (section.offset > file.size() || section.size > file.size() - section.offset) {
     damaged(name, fmt::format("{} at byte {} of {} bytes, past the file's end at {}", what,
                               section.offset, section.size, file.size()));
@@ -128,8 +127,8 @@ TransportInfo info_of(const TransportHeader& header, std::span<const std::byte> 
 
 void check_shape(const TransportHeader& header, const std::string& name) {
   if (header.face_size < 1 || header.face_size > 1024 || !std::has_single_bit(header.face_size)) {
-    damaged(name, fmt::format("face size {}, expected a power of two from 1 to 1024",
-                              header.face_size));
+    damaged(name,
+            fmt::format("face size {}, expected a power of two from 1 to 1024", header.face_size));
   }
   const std::uint64_t outputs = std::uint64_t{header.width} * header.height;
   const std::uint64_t rows = std::uint64_t{header.chunk_count} * kChunkRows;
@@ -159,9 +158,8 @@ Transport Transport::open(const std::filesystem::path& file) {
 
   const auto columns = static_cast<std::size_t>(data->layout.size());
   const std::size_t rows = static_cast<std::size_t>(header.chunk_count) * kChunkRows;
-  RowTables tables =
-      unpack_tables(section_bytes(bytes, header.rows, name, "row tables"), rows,
-                    static_cast<std::size_t>(header.width) * header.height, name);
+  RowTables tables = unpack_tables(section_bytes(bytes, header.rows, name, "row tables"), rows,
+                                   static_cast<std::size_t>(header.width) * header.height, name);
   data->row_output = std::move(tables.row_output);
   data->row_color = std::move(tables.row_color);
   data->coverage = std::move(tables.coverage);

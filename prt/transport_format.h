@@ -32,10 +32,10 @@ struct TransportHeader {
   double camera_position[3];
   double camera_orientation[9];  ///< rows
   double camera_vertical_fov;
-  FileSection meta;          ///< JSON text
-  FileSection rows;          ///< zstd of the row tables: see RowTables in transport_tables.h
-  FileSection column_norms;  ///< float, one a coefficient
-  FileSection chunk_table;   ///< FileSection, one a chunk
+  FileSection meta;           ///< JSON text
+  FileSection rows;           ///< zstd of the row tables: see RowTables in transport_tables.h
+  FileSection column_norms;   ///< float, one a coefficient
+  FileSection chunk_table;    ///< FileSection, one a chunk
   std::uint64_t header_hash;  ///< XXH3 of all bytes above
 };
 static_assert(sizeof(TransportHeader) == 8 + 24 + 8 + 13 * 8 + 4 * 24 + 8);

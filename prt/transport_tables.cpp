@@ -65,10 +65,11 @@ RowTables unpack_tables(std::span<const std::byte> packed, std::size_t rows, std
     }
     if (output == kNoOutput) continue;
     if (output >= outputs || used[output]) {
-      throw Error(ErrorKind::format,
-                  fmt::format("{}: row {} goes to output {}, expected one below {} that no other row "
-                              "goes to",
-                              name, row, output, outputs));
+      throw Error(
+          ErrorKind::format,
+          fmt::format("{}: row {} goes to output {}, expected one below {} that no other row "
+                      "goes to",
+                      name, row, output, outputs));
     }
     used[output] = true;
   }

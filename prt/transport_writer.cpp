@@ -212,8 +212,7 @@ void TransportWriter::finish(const std::string& meta, const Progress& progress) 
       add_column_energies(s.layout, assembled[slot], chunk_colors(tables, chunk), energies[chunk]);
     });
     for (std::size_t slot = 0; slot < count; ++slot) {
-      out.write(blank.data(),
-                (kChunkAlignment - out.size() % kChunkAlignment) % kChunkAlignment);
+      out.write(blank.data(), (kChunkAlignment - out.size() % kChunkAlignment) % kChunkAlignment);
       sections[first + slot] = append(out, assembled[slot].data(), assembled[slot].size());
       error.add(errors[slot]);
     }
@@ -253,8 +252,8 @@ Transport build_transport(TransportInfo info, std::span<const TileRows> tiles,
   const std::size_t chunks = tables.row_output.size() / kChunkRows;
   if (tiles.size() != chunks * kTiles) {
     throw Error(ErrorKind::invalid_argument,
-                fmt::format("{} tiles, expected {} for {}x{} pixels", tiles.size(),
-                            chunks * kTiles, info.width, info.height));
+                fmt::format("{} tiles, expected {} for {}x{} pixels", tiles.size(), chunks * kTiles,
+                            info.width, info.height));
   }
   auto buffers = std::make_shared<std::vector<std::vector<std::byte>>>(chunks);
   std::vector<std::vector<double>> energies(chunks);
@@ -263,6 +262,7 @@ Transport build_transport(TransportInfo info, std::span<const TileRows> tiles,
     std::vector<const CompressedTile*> pointers(kTiles);
     for (std::size_t t = 0; t < kTiles; ++t) {
       const TileRows& rows = tiles[c * kTiles + t];
+      if (rows.values.empty()) continue;
       compressed[t] = compress_tile(layout, rows, thresholds);
       pointers[t] = &compressed[t];
       place_rows(c * kTiles + t, rows.color, rows.coverage, tables);

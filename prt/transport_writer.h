@@ -82,7 +82,7 @@ class TransportWriter {
 };
 
 /// A transport in memory from all its tiles; for tests and small uses of the library.
-/// `tiles.size()` is image_row_order(...).size() / kTileRows.
+/// `tiles.size()` is image_row_order(...).size() / kTileRows; a tile without values is empty.
 Transport build_transport(TransportInfo info, std::span<const TileRows> tiles,
                           const std::vector<float>& thresholds);
 

@@ -1,0 +1,277 @@
+// Running sums and the log of each band; see row_sums.h for the idea.
+
+#include "prt/row_sums.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "core/parallel.h"
+#include "prt/apply_kernel.h"
+
+namespace haarlight {
+namespace {
+
+// A band's log is folded into a kept picture when streaming it would cost this many pictures of
+// sums. Folding costs the log once more and a read and a write of the picture.
+constexpr std::uint64_t kFoldPictures = 4;
+
+}  // namespace
+
+struct RowSums::State {
+  explicit State(Transport t) : transport(std::move(t)) {
+    const auto chunks = static_cast<std::size_t>(transport.chunk_count());
+    const auto columns = static_cast<std::size_t>(transport.layout().size());
+    totals.resize(chunks * kChunkTotals);
+    chunk_lit.assign(chunks, 0);
+    shown.resize(columns);
+    in_shown.assign(columns, 0);
+    logged.resize(columns);
+    in_log.assign(columns, 0);
+    bytes_of.resize(columns);
+    for (std::size_t j = 0; j < columns; ++j) {
+      bytes_of[j] = transport.column_bytes(static_cast<int>(j));
+    }
+    columns_scratch.reserve(columns);
+  }
+
+  std::uint64_t picture_bytes() const { return totals.size() * sizeof(double); }
+
+  Transport transport;
+  std::vector<double> totals;
+  std::vector<std::uint8_t> chunk_lit;  // a chunk of totals holds something other than +0
+
+  // What of each band is in the totals: its kept picture (if lit) plus its log.
+  struct Band {
+    std::vector<int> log;         // coefficients with an entry in `logged`
+    std::uint64_t log_bytes = 0;  // of their columns
+    std::vector<double> kept;     // as totals, or not allocated
+    bool kept_lit = false;
+    std::vector<int> shown;  // coefficients that moved since the band was last empty
+    int lit = 0;             // how many of them are not zero
+  };
+  std::array<Band, HaarLayout::kMaxBands> band;
+  std::vector<RgbD> shown;  // T * shown is what the totals stand for
+  std::vector<std::uint8_t> in_shown;
+  std::vector<RgbD> logged;  // sum of deltas since the band was last empty or folded
+  std::vector<std::uint8_t> in_log;
+  std::vector<std::uint64_t> bytes_of;
+
+  std::vector<WaveletDelta> columns_scratch;
+  bool expect_resets = true;
+
+  // Follows the lighting itself; true if anything is lit afterwards.
+  bool follow(const LightingUpdate& update) {
+    const auto bands = static_cast<std::size_t>(transport.layout().band_count());
+    int lit = 0;
+    for (std::size_t b = 0; b < bands; ++b) {
+      if (!update.reset[b]) continue;
+      for (int index : band[b].shown) {
+        shown[static_cast<std::size_t>(index)] = {};
+        in_shown[static_cast<std::size_t>(index)] = 0;
+      }
+      band[b].shown.clear();
+      band[b].lit = 0;
+    }
+    for (const WaveletDelta& delta : update.deltas) {
+      const auto j = static_cast<std::size_t>(delta.index);
+      Band& b = band[static_cast<std::size_t>(transport.layout().band_of(delta.index))];
+      if (!in_shown[j]) {
+        in_shown[j] = 1;
+        b.shown.push_back(delta.index);
+      }
+      b.lit -= !(shown[j] == RgbD{});
+      shown[j] += delta.delta;
+      b.lit += !(shown[j] == RgbD{});
+    }
+    for (std::size_t b = 0; b < bands; ++b) lit += band[b].lit;
+    return lit > 0;
+  }
+
+  void log(const WaveletDelta& delta) {
+    const auto j = static_cast<std::size_t>(delta.index);
+    Band& b = band[static_cast<std::size_t>(transport.layout().band_of(delta.index))];
+    if (!in_log[j]) {
+      in_log[j] = 1;
+      b.log.push_back(delta.index);
+      b.log_bytes += bytes_of[j];
+    }
+    logged[j] += delta.delta;
+  }
+
+  void clear_log(Band& b) {
+    for (int index : b.log) {
+      logged[static_cast<std::size_t>(index)] = {};
+      in_log[static_cast<std::size_t>(index)] = 0;
+    }
+    b.log.clear();
+    b.log_bytes = 0;
+  }
+
+  // Streams columns into rows laid out as totals. `before` prepares a chunk and says whether it
+  // changed something; `done` is called for changed chunks.
+  template <typename Before>
+  void stream(std::span<const WaveletDelta> columns, std::vector<double>& sums,
+              const Before& before, const ChunkDone& done) {
+    parallel_for(transport.chunk_count(), [&](int chunk) {
+      thread_local std::vector<ColumnTask> tasks;
+      tasks.clear();
+      for (const WaveletDelta& column : columns) {
+        const ColumnBlocks blocks = transport.column(chunk, column.index);
+        if (!blocks.present) continue;
+        tasks.push_back({blocks, {column.delta.r, column.delta.g, column.delta.b}});
+      }
+      double* chunk_sums = sums.data() + static_cast<std::size_t>(chunk) * kChunkTotals;
+      const bool changed = before(chunk, chunk_sums, !tasks.empty());
+      if (tasks.empty() && !changed) return;
+      apply_columns(transport.rgb_blocks(chunk), tasks, chunk_sums);
+      if (done) done(chunk, chunk_sums);
+    });
+  }
+
+  void fold(Band& b, ApplyStats& stats) {
+    std::sort(b.log.begin(), b.log.end());
+    columns_scratch.clear();
+    for (int index : b.log) {
+      columns_scratch.push_back({index, logged[static_cast<std::size_t>(index)]});
+    }
+    const bool fresh = !b.kept_lit;
+    if (b.kept.empty()) b.kept.resize(totals.size());
+    stream(columns_scratch, b.kept,
+           [&](int, double* sums, bool) {
+             if (fresh) std::fill(sums, sums + kChunkTotals, 0.0);
+             return fresh;
+           },
+           {});
+    stats.transport_bytes += b.log_bytes;
+    stats.sum_bytes += 2 * picture_bytes();
+    stats.columns += static_cast<int>(columns_scratch.size());
+    b.kept_lit = true;
+    clear_log(b);
+  }
+};
+
+RowSums::RowSums(Transport transport) : state_(std::make_unique<State>(std::move(transport))) {}
+RowSums::~RowSums() = default;
+RowSums::RowSums(RowSums&&) noexcept = default;
+RowSums& RowSums::operator=(RowSums&&) noexcept = default;
+
+ApplyStats RowSums::apply(const LightingUpdate& update, const ChunkDone& done) {
+  State& s = *state_;
+  ApplyStats stats;
+  const auto bands = static_cast<std::size_t>(s.transport.layout().band_count());
+
+  // Nothing stays of the old light: start from zero, which is exact and reads no sums.
+  const bool lit = s.follow(update);
+  bool from_zero = true;
+  for (std::size_t b = 0; b < bands; ++b) {
+    from_zero &= update.reset[b] || (s.band[b].log.empty() && !s.band[b].kept_lit);
+  }
+  from_zero |= !lit;
+
+  // Gather the columns to stream: what reset bands logged, taken back, and the update's deltas.
+  std::array<const double*, HaarLayout::kMaxBands> taken_back{};
+  std::size_t taken_back_count = 0;
+  for (std::size_t b = 0; b < bands; ++b) {
+    if (!update.reset[b] && lit) continue;
+    State::Band& band = s.band[b];
+    if (from_zero) {
+      s.clear_log(band);
+    } else {
+      for (int index : band.log) {
+        // A log entry's mark stays set, so that a delta of this update meets it below.
+        s.logged[static_cast<std::size_t>(index)] = -s.logged[static_cast<std::size_t>(index)];
+      }
+      if (band.kept_lit) taken_back[taken_back_count++] = band.kept.data();
+    }
+    band.kept_lit = false;
+  }
+  s.columns_scratch.clear();
+  if (!lit) {
+    // All light is out, whatever the deltas that got there.
+  } else if (from_zero) {
+    s.columns_scratch.assign(update.deltas.begin(), update.deltas.end());
+  } else {
+    for (const WaveletDelta& delta : update.deltas) {
+      const auto j = static_cast<std::size_t>(delta.index);
+      const auto b = static_cast<std::size_t>(s.transport.layout().band_of(delta.index));
+      RgbD column = delta.delta;
+      if (update.reset[b] && s.in_log[j]) {
+        column += s.logged[j];
+        s.logged[j] = {};
+      }
+      s.columns_scratch.push_back({delta.index, column});
+    }
+    for (std::size_t b = 0; b < bands; ++b) {
+      if (!update.reset[b]) continue;
+      for (int index : s.band[b].log) {
+        const RgbD back = s.logged[static_cast<std::size_t>(index)];
+        if (!(back == RgbD{})) s.columns_scratch.push_back({index, back});
+      }
+      s.clear_log(s.band[b]);
+    }
+    std::sort(s.columns_scratch.begin(), s.columns_scratch.end(),
+              [](const WaveletDelta& a, const WaveletDelta& b) { return a.index < b.index; });
+  }
+  std::erase_if(s.columns_scratch, [](const WaveletDelta& d) { return d.delta == RgbD{}; });
+  if (lit) {
+    for (const WaveletDelta& delta : update.deltas) s.log(delta);
+  }
+
+  // Stream them, chunk by chunk: reset, apply and the caller's finish while a chunk is in cache.
+  for (const WaveletDelta& column : s.columns_scratch) {
+    stats.transport_bytes += s.bytes_of[static_cast<std::size_t>(column.index)];
+  }
+  stats.columns = static_cast<int>(s.columns_scratch.size());
+  std::atomic<std::uint64_t> touched{0};
+  s.stream(
+      s.columns_scratch, s.totals,
+      [&](int chunk, double* sums, bool has_columns) {
+        std::uint8_t& lit = s.chunk_lit[static_cast<std::size_t>(chunk)];
+        bool changed = false;
+        if (from_zero && lit) {
+          std::fill(sums, sums + kChunkTotals, 0.0);
+          changed = true;
+          lit = 0;
+        }
+        for (std::size_t k = 0; k < taken_back_count; ++k) {
+          const double* back = taken_back[k] + static_cast<std::size_t>(chunk) * kChunkTotals;
+          for (int i = 0; i < kChunkTotals; ++i) sums[i] -= back[i];
+          changed = true;
+        }
+        if (has_columns) lit = 1;
+        if (has_columns || changed) {
+          touched.fetch_add(1 + (from_zero ? 0 : 1) + taken_back_count, std::memory_order_relaxed);
+        }
+        return changed;
+      },
+      done);
+  stats.sum_bytes += touched.load() * kChunkTotals * sizeof(double);
+
+  if (s.expect_resets) {
+    for (std::size_t b = 0; b < bands; ++b) {
+      if (s.band[b].log_bytes > kFoldPictures * s.picture_bytes()) s.fold(s.band[b], stats);
+    }
+  }
+  return stats;
+}
+
+void RowSums::expect_resets(bool expected) { state_->expect_resets = expected; }
+
+const Transport& RowSums::transport() const { return state_->transport; }
+std::span<const double> RowSums::totals() const { return state_->totals; }
+
+std::uint64_t RowSums::extra_bytes() const {
+  const State& s = *state_;
+  std::uint64_t bytes = s.picture_bytes() + 2 * s.logged.size() * (sizeof(RgbD) + 1) +
+                        8 * s.bytes_of.size() + s.columns_scratch.capacity() * sizeof(WaveletDelta);
+  for (const auto& band : s.band) {
+    bytes += band.kept.size() * sizeof(double) + 4 * (band.log.size() + band.shown.size());
+  }
+  return bytes;
+}
+
+}  // namespace haarlight
