@@ -230,19 +230,19 @@ ApplyStats RowSums::apply(const LightingUpdate& update, const ChunkDone& done) {
   s.stream(
       s.columns_scratch, s.totals,
       [&](int chunk, double* sums, bool has_columns) {
-        std::uint8_t& lit = s.chunk_lit[static_cast<std::size_t>(chunk)];
+        std::uint8_t& chunk_lit = s.chunk_lit[static_cast<std::size_t>(chunk)];
         bool changed = false;
-        if (from_zero && lit) {
+        if (from_zero && chunk_lit) {
           std::fill(sums, sums + kChunkTotals, 0.0);
           changed = true;
-          lit = 0;
+          chunk_lit = 0;
         }
         for (std::size_t k = 0; k < taken_back_count; ++k) {
           const double* back = taken_back[k] + static_cast<std::size_t>(chunk) * kChunkTotals;
           for (int i = 0; i < kChunkTotals; ++i) sums[i] -= back[i];
           changed = true;
         }
-        if (has_columns) lit = 1;
+        if (has_columns) chunk_lit = 1;
         if (has_columns || changed) {
           touched.fetch_add(1 + (from_zero ? 0 : 1) + taken_back_count, std::memory_order_relaxed);
         }
