@@ -2,10 +2,11 @@
 
 #pragma once
 
-#include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/vec.h"
 #include "wavelet/environment.h"
@@ -20,8 +21,9 @@ enum class MotionKind {
   tumble,  ///< about +Y by 2 degrees * t, then about +X by 1.6 degrees * t^2
   swing,   ///< about +Y by 0.4 degrees * sin(4 pi t)
   blend,   ///< (1 - t) A + t B
-  light,   ///< a disc light (cosine of half-angle 0.97, radiance 50) carried once round the
-           ///< direction (0.6, 0.64, 0.48) over 2 % of A
+  light,   ///< a white disc light (cosine of half-angle 0.97, radiance 50) added to 2 % of A. Its
+          ///< middle goes once round the direction (0.6, 0.64, 0.48), right-handed, 30 degrees from
+          ///< it, starting on the side of +Y
 };
 
 struct MotionOptions {
@@ -47,7 +49,7 @@ class Motion {
 
   const MotionOptions& options() const { return options_; }
 
-  /// Radiance on the cube map of a frame, texel averages.
+  /// Radiance on the cube map of a frame >= 0, texel averages; valid until the next call.
   const Cubemap& cubemap(int frame);
 
   /// The same as Haar coefficients, layout.size() of them; valid until the next call. Frames at and
@@ -58,10 +60,10 @@ class Motion {
   MotionOptions options_;
   HaarLayout layout_;
   EnvironmentSampler from_;
-  std::optional<EnvironmentSampler> to_;
-  Cubemap current_, start_, other_;
+  Cubemap current_, start_, other_;  // of the frame; of A and of B as they stand
   std::vector<Rgb> coefficients_;
-  int frame_ = -1;
+  int frame_ = -1;            // the frame, at most stop, that current_ shows
+  bool transformed_ = false;  // coefficients_ belong to current_
 };
 
 }  // namespace haarlight
