@@ -24,7 +24,6 @@ constexpr std::array<KindName, 6> kNames = {{{MotionKind::still, "still"},
                                              {MotionKind::blend, "blend"},
                                              {MotionKind::light, "light"}}};
 
-constexpr double kDiscRadiance = 50, kDiscCosine = 0.97, kBackgroundShare = 0.02;
 constexpr Vec3 kDiscAxis = {0.6, 0.64, 0.48};
 constexpr double kDiscFromAxis = kPi / 6;
 
@@ -37,16 +36,6 @@ int effective_frame(const MotionOptions& options, int frame) {
 
 double time_of(const MotionOptions& options, int frame) {
   return static_cast<double>(effective_frame(options, frame)) / options.stop;
-}
-
-/// Middle of the disc: from the point 30 degrees above the axis, right-handed once round it.
-Vec3 disc_center(double t) {
-  const Vec3 up{0, 1, 0};
-  const Vec3 above = normalize(up - kDiscAxis * dot(up, kDiscAxis));
-  const Vec3 side = cross(kDiscAxis, above);
-  const double angle = 2 * kPi * t;
-  return normalize(kDiscAxis * std::cos(kDiscFromAxis) +
-                   (above * std::cos(angle) + side * std::sin(angle)) * std::sin(kDiscFromAxis));
 }
 
 /// Share of a texel's solid angle under the disc, by samples in a square grid.
@@ -130,6 +119,16 @@ Rotation motion_rotation(const MotionOptions& options, int frame) {
   return {};
 }
 
+Vec3 motion_disc_center(const MotionOptions& options, int frame) {
+  check(options);
+  const Vec3 up{0, 1, 0};
+  const Vec3 above = normalize(up - kDiscAxis * dot(up, kDiscAxis));
+  const Vec3 side = cross(kDiscAxis, above);
+  const double angle = 2 * kPi * time_of(options, frame);
+  return normalize(kDiscAxis * std::cos(kDiscFromAxis) +
+                   (above * std::cos(angle) + side * std::sin(angle)) * std::sin(kDiscFromAxis));
+}
+
 Motion::Motion(const MotionOptions& options, const HaarLayout& layout, const Environment& from,
                const Environment* to)
     : options_(options),
@@ -171,8 +170,8 @@ const Cubemap& Motion::cubemap(int frame) {
     }
     case MotionKind::light:
       std::transform(start_.texels.begin(), start_.texels.end(), current_.texels.begin(),
-                     [](const Rgb& a) { return static_cast<float>(kBackgroundShare) * a; });
-      add_disc(disc_center(time_of(options_, wanted)), current_);
+                     [](const Rgb& a) { return static_cast<float>(kDiscBackgroundShare) * a; });
+      add_disc(motion_disc_center(options_, wanted), current_);
       break;
   }
   frame_ = wanted;

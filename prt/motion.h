@@ -39,6 +39,14 @@ std::string motion_name(MotionKind kind);
 /// every time. Requires frame >= 0.
 Rotation motion_rotation(const MotionOptions& options, int frame);
 
+/// The disc of `light`: white radiance inside a cone, and what is left of A behind it.
+inline constexpr double kDiscRadiance = 50;           ///< W m^-2 sr^-1
+inline constexpr double kDiscCosine = 0.97;           ///< of the cone's half-angle
+inline constexpr double kDiscBackgroundShare = 0.02;  ///< of A
+
+/// Unit direction of the disc's middle in a frame. Requires frame >= 0.
+Vec3 motion_disc_center(const MotionOptions& options, int frame);
+
 /// Target lighting frame by frame.
 class Motion {
  public:
