@@ -33,19 +33,24 @@ struct Triangle {
 
 /// What the importer mended; printed by programs, tested by tests.
 struct SceneReport {
-  std::int64_t dropped_degenerate = 0;  ///< zero-area or with repeated corners
-  std::int64_t dropped_not_finite = 0;  ///< with a NaN or infinite corner
-  std::int64_t dropped_duplicate = 0;   ///< same three corners as an earlier one
-  std::int64_t normals_made = 0;        ///< vertices whose normal was missing, zero or not finite
+  std::int64_t dropped_degenerate = 0;    ///< zero-area or with repeated corners
+  std::int64_t dropped_not_finite = 0;    ///< with a NaN or infinite corner
+  std::int64_t dropped_duplicate = 0;     ///< same three corners as an earlier one
+  std::int64_t dropped_not_triangle = 0;  ///< points and lines
+  std::int64_t normals_made = 0;          ///< vertices whose normal was missing, zero or not finite
+  std::int64_t unused_vertices = 0;       ///< that no triangle used: removed
+  std::int64_t textures_missing = 0;  ///< named by the file, not there: the plain colour is used
 };
 
 struct Scene {
-  std::vector<Vec3> position;   ///< world space, metres
-  std::vector<Vec3> normal;     ///< unit, one a vertex
-  std::vector<std::array<float, 2>> uv;  ///< one a vertex; (0, 0) where there is none
+  std::string name;                      ///< for messages and files: the imported file's name
+  std::vector<Vec3> position;            ///< world space, metres
+  std::vector<Vec3> normal;              ///< unit, one a vertex
+  std::vector<std::array<float, 2>> uv;  ///< one a vertex, v up; (0, 0) where there is none
+  std::vector<Rgb> tint;  ///< one a vertex, linear, multiplies the albedo; empty: all white
   std::vector<Triangle> triangle;
   std::vector<Material> material;  ///< at least one
-  std::vector<Image> texture;      ///< linear base colour
+  std::vector<Image> texture;      ///< linear base colour, repeating
   std::optional<Camera> camera;    ///< of the file, if it has one
   SceneReport report;
 };

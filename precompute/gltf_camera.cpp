@@ -1,0 +1,153 @@
+// What glTF files say and the scene reader gets wrong: the camera, and how many materials there
+// are.
+
+#include "precompute/gltf_camera.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+
+namespace haarlight {
+namespace {
+
+using nlohmann::json;
+
+// Columns of a node's matrix and where its origin goes.
+struct Affine {
+  Vec3 x{1, 0, 0}, y{0, 1, 0}, z{0, 0, 1}, origin;
+  Vec3 direction(const Vec3& v) const { return x * v.x + y * v.y + z * v.z; }
+  Vec3 point(const Vec3& v) const { return direction(v) + origin; }
+  Affine operator*(const Affine& first) const {
+    return {direction(first.x), direction(first.y), direction(first.z), point(first.origin)};
+  }
+};
+
+Affine local_transform(const json& node) {
+  Affine a;
+  if (node.contains("matrix")) {  // column-major
+    const auto m = node.at("matrix").get<std::vector<double>>();
+    const auto column = [&](std::size_t c) { return Vec3{m.at(c), m.at(c + 1), m.at(c + 2)}; };
+    return {column(0), column(4), column(8), column(12)};
+  }
+  if (node.contains("rotation")) {
+    const auto q = node.at("rotation").get<std::vector<double>>();
+    const double x = q.at(0), y = q.at(1), z = q.at(2), w = q.at(3);
+    a.x = {1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)};
+    a.y = {2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)};
+    a.z = {2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)};
+  }
+  if (node.contains("scale")) {
+    const auto s = node.at("scale").get<std::vector<double>>();
+    a.x = a.x * s.at(0), a.y = a.y * s.at(1), a.z = a.z * s.at(2);
+  }
+  if (node.contains("translation")) {
+    const auto t = node.at("translation").get<std::vector<double>>();
+    a.origin = {t.at(0), t.at(1), t.at(2)};
+  }
+  return a;
+}
+
+// Upright, orthonormal and right-handed whatever scales the nodes above carry.
+std::optional<Camera> make_camera(const Affine& place, double vertical_fov) {
+  const double back_length = length(place.z), up_length = length(place.y);
+  if (!(vertical_fov > 0) || !(vertical_fov < kPi) || !(back_length > 0) || !(up_length > 0) ||
+      !std::isfinite(length(place.origin)) || !std::isfinite(back_length)) {
+    return std::nullopt;
+  }
+  const Vec3 back = place.z * (1 / back_length);
+  const Vec3 side = cross(place.y, back);
+  if (!(length(side) > 1e-9 * up_length)) return std::nullopt;
+  const Vec3 right = normalize(side);
+  Camera camera;
+  camera.position = place.origin;
+  camera.orientation = Rotation{{right, cross(back, right), back}}.transposed();
+  camera.vertical_fov = vertical_fov;
+  return camera;
+}
+
+std::optional<Camera> find_camera(const json& file) {
+  if (!file.contains("cameras") || !file.contains("nodes") || !file.contains("scenes")) {
+    return std::nullopt;
+  }
+  const json& nodes = file.at("nodes");
+  const json& scene = file.at("scenes").at(file.value("scene", std::size_t{0}));
+  struct Visit {
+    std::size_t node;
+    Affine above;
+    int depth;
+  };
+  std::vector<Visit> todo;
+  if (scene.contains("nodes")) {
+    for (const auto& root : scene.at("nodes")) todo.push_back({root.get<std::size_t>(), {}, 0});
+  }
+  // In the order of the file; a graph deeper than this can only be a circle.
+  constexpr int kDeepest = 256;
+  for (std::size_t i = 0; i < todo.size() && todo.size() <= 1000000; ++i) {
+    const Visit here = todo[i];
+    const json& node = nodes.at(here.node);
+    const Affine place = here.above * local_transform(node);
+    if (node.contains("camera")) {
+      const json& camera = file.at("cameras").at(node.at("camera").get<std::size_t>());
+      if (camera.contains("perspective")) {
+        const auto made = make_camera(place, camera.at("perspective").at("yfov").get<double>());
+        if (made) return made;
+      }
+    }
+    if (node.contains("children") && here.depth < kDeepest) {
+      for (const auto& child : node.at("children")) {
+        todo.push_back({child.get<std::size_t>(), place, here.depth + 1});
+      }
+    }
+  }
+  return std::nullopt;
+}
+
+// The JSON text: the whole .gltf, or the first chunk of a .glb.
+std::string json_text(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) {
+    throw Error(ErrorKind::io, fmt::format("{}: cannot be opened for reading", file.string()));
+  }
+  std::string bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  if (!bytes.starts_with("glTF")) return bytes;
+  constexpr std::size_t kHeader = 12, kChunkHeader = 8;
+  std::uint32_t size = 0;
+  if (bytes.size() < kHeader + kChunkHeader) return {};
+  std::memcpy(&size, bytes.data() + kHeader, sizeof size);
+  if (bytes.compare(kHeader + 4, 4, "JSON") != 0 || size > bytes.size() - kHeader - kChunkHeader) {
+    return {};
+  }
+  return bytes.substr(kHeader + kChunkHeader, size);
+}
+
+}  // namespace
+
+GltfExtras read_gltf_extras(const std::filesystem::path& file) {
+  try {
+    const json parsed = json::parse(json_text(file));
+    GltfExtras extras;
+    if (parsed.contains("materials")) extras.materials = parsed.at("materials").size();
+    extras.camera = find_camera(parsed);
+    return extras;
+  } catch (const json::exception&) {
+    throw Error(ErrorKind::format,
+                fmt::format("{}: not readable as glTF, expected the JSON of glTF 2.0 or a GLB that "
+                            "is not cut short",
+                            file.string()));
+  } catch (const std::out_of_range&) {
+    throw Error(
+        ErrorKind::format,
+        fmt::format("{}: a camera's node has too few numbers in its transform", file.string()));
+  }
+}
+
+}  // namespace haarlight

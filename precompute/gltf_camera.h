@@ -1,0 +1,25 @@
+// What glTF files say and the scene reader gets wrong: the camera, and how many materials there
+// are.
+
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+
+#include "core/camera.h"
+
+namespace haarlight {
+
+struct GltfExtras {
+  std::optional<Camera> camera;  ///< the first perspective camera that a node of the scene carries
+  std::size_t materials = 0;     ///< in the file; the reader adds a default one behind them
+};
+
+/// Reads the JSON of a .gltf or .glb file directly: assimp 5.2 moves cameras twice and stretches
+/// the field of view in a way that changed between its versions. glTF 2.0 specification, sections
+/// 3.5.3 (node transforms), 3.10 (cameras) and 4.4 (the GLB container). Throws Error{format} if
+/// the file is not glTF, Error{io} if it cannot be read.
+GltfExtras read_gltf_extras(const std::filesystem::path& file);
+
+}  // namespace haarlight

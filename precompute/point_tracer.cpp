@@ -1,0 +1,233 @@
+// One shading point -> what each texel of distant light contributes to it. The hot loop.
+//
+//   first pass     a ray through the first sample of every texel above the horizon
+//   differences    texels whose visibility differs from a neighbour's need a closer look
+//   sure texels    V times the whole texel's cosine (and lobe)
+//   refine         sum over samples of V_s f max(0, n.w_s) dw_s
+
+#include "precompute/point_tracer.h"
+
+#include <algorithm>
+#include <bit>
+#include <optional>
+
+#include "precompute/phong_lobe.h"
+
+namespace haarlight {
+namespace {
+
+struct FloatVec {
+  float x, y, z;
+  explicit FloatVec(const Vec3& v)
+      : x(static_cast<float>(v.x)), y(static_cast<float>(v.y)), z(static_cast<float>(v.z)) {}
+  float dot(float a, float b, float c) const { return x * a + y * b + z * c; }
+};
+
+bool get(const std::vector<std::uint64_t>& bits, std::size_t i) {
+  return bits[i / 64] >> (i % 64) & 1;
+}
+void set(std::vector<std::uint64_t>& bits, std::int32_t i) {
+  bits[static_cast<std::size_t>(i) / 64] |= std::uint64_t{1} << (i % 64);
+}
+
+// The 8 lanes of a packet are two rows of 4 texels that never straddle a word.
+void set_lanes(std::vector<std::uint64_t>& bits, const DirectionTable::Packet& p, unsigned lanes) {
+  bits[static_cast<std::size_t>(p.top) / 64] |= std::uint64_t{lanes & 15u} << (p.top % 64);
+  bits[static_cast<std::size_t>(p.bottom) / 64] |= std::uint64_t{lanes >> 4} << (p.bottom % 64);
+}
+
+// bits[i + shift], as a word of bits.
+std::uint64_t word_at(const std::vector<std::uint64_t>& bits, std::size_t word, std::size_t shift) {
+  const std::size_t w = word + shift / 64, s = shift % 64;
+  const std::uint64_t low = w < bits.size() ? bits[w] : 0;
+  if (s == 0) return low;
+  const std::uint64_t high = w + 1 < bits.size() ? bits[w + 1] : 0;
+  return low >> s | high << (64 - s);
+}
+
+// Lanes whose dot product of `direction` with `normal` is above `bound`.
+unsigned lanes_above(const float* x, const float* y, const float* z, const FloatVec& normal,
+                     float bound) {
+  float cosine[8];
+  for (unsigned i = 0; i < 8; ++i) cosine[i] = normal.dot(x[i], y[i], z[i]);
+  unsigned lanes = 0;
+  for (unsigned i = 0; i < 8; ++i) lanes |= static_cast<unsigned>(cosine[i] > bound) << i;
+  return lanes;
+}
+
+}  // namespace
+
+PointTracer::PointTracer(const Visibility& visibility, const DirectionTable& table, bool adaptive)
+    : visibility_(visibility), table_(table), adaptive_(adaptive) {
+  const std::size_t words = (table.texels() + 63) / 64;
+  const auto n = static_cast<std::size_t>(table.n);
+  has_right_.assign(words, 0);
+  has_below_.assign(words, 0);
+  for (std::size_t k = 0; k < table.texels(); ++k) {
+    const std::uint64_t bit = std::uint64_t{1} << (k % 64);
+    if (k % n + 1 < n) has_right_[k / 64] |= bit;
+    if (k / n % n + 1 < n) has_below_[k / 64] |= bit;
+  }
+}
+
+void PointTracer::first_pass(const ShadingPoint& point, PointScratch& scratch, RayCounts& counts,
+                             const GroupFlags& free_groups) const {
+  const FloatVec normal(point.normal), geometric(point.geometric_normal);
+  for (std::size_t i = 0; i < table_.group.size(); ++i) {
+    const DirectionTable::Group& g = table_.group[i];
+    const float n_axis = normal.dot(g.x, g.y, g.z), g_axis = geometric.dot(g.x, g.y, g.z);
+    if (n_axis <= -g.radius || g_axis <= -g.radius) continue;
+    const bool above = n_axis > g.radius && g_axis > g.radius;
+    const bool is_free = !free_groups.empty() && free_groups[i] != 0;
+    for (std::int32_t j = g.first; j < g.first + g.count; ++j) {
+      const DirectionTable::Packet& p = table_.packet[static_cast<std::size_t>(j)];
+      unsigned lanes = 0xff;  // first samples above both horizons
+      if (!above) {
+        const unsigned touched = lanes_above(p.cx, p.cy, p.cz, normal, -p.radius) &
+                                 lanes_above(p.cx, p.cy, p.cz, geometric, -p.radius);
+        if (touched == 0) continue;
+        const unsigned whole = lanes_above(p.cx, p.cy, p.cz, normal, p.radius) &
+                               lanes_above(p.cx, p.cy, p.cz, geometric, p.radius);
+        lanes = touched & lanes_above(p.x, p.y, p.z, normal, 0) &
+                lanes_above(p.x, p.y, p.z, geometric, 0);
+        if (touched != whole) set_lanes(scratch.refine, p, touched & ~whole);
+        if (lanes == 0) continue;
+      }
+      unsigned blocked = 0;
+      if (is_free) {
+        counts.spared += std::popcount(lanes);
+      } else {
+        blocked = visibility_.occluded8(point.origin, p.x, p.y, p.z, lanes);
+        counts.shadow += std::popcount(lanes);
+      }
+      set_lanes(scratch.known, p, lanes);
+      set_lanes(scratch.visible, p, lanes & ~blocked);
+    }
+  }
+}
+
+void PointTracer::mark_differences(PointScratch& scratch) const {
+  const std::size_t words = scratch.known.size();
+  const auto n = static_cast<std::size_t>(table_.n);
+  for (const bool below : {false, true}) {
+    const std::size_t shift = below ? n : 1;
+    for (std::size_t w = 0; w < words; ++w) {
+      if (scratch.known[w] == 0) continue;
+      std::uint64_t differs = (scratch.visible[w] ^ word_at(scratch.visible, w, shift)) &
+                              scratch.known[w] & word_at(scratch.known, w, shift);
+      if (differs == 0) continue;
+      differs &= below ? has_below_[w] : has_right_[w];
+      scratch.refine[w] |= differs;
+      const std::size_t up = w + shift / 64, s = shift % 64;  // the same texels, shifted on
+      if (up < words) scratch.refine[up] |= differs << s;
+      if (s != 0 && up + 1 < words) scratch.refine[up + 1] |= differs >> (64 - s);
+    }
+  }
+  for (const auto& [a, b] : table_.seam) {
+    const auto i = static_cast<std::size_t>(a), j = static_cast<std::size_t>(b);
+    if (get(scratch.known, i) && get(scratch.known, j) &&
+        get(scratch.visible, i) != get(scratch.visible, j)) {
+      set(scratch.refine, a);
+      set(scratch.refine, b);
+    }
+  }
+}
+
+void PointTracer::refine(const ShadingPoint& point, const PhongLobe* phong,
+                         std::span<float> lambert, std::span<float> lobe, PointScratch& scratch,
+                         RayCounts& counts) const {
+  const FloatVec normal(point.normal), geometric(point.geometric_normal);
+  const auto samples = static_cast<std::size_t>(table_.samples);
+  const auto inverse_pi = static_cast<float>(1 / kPi);
+
+  // Rays of any texels wait here until there are eight; results are added in the order of arrival.
+  alignas(32) float x[8] = {}, y[8] = {}, z[8] = {};
+  float lambert_part[8], lobe_part[8];
+  std::size_t texel_of[8];
+  unsigned waiting = 0;
+  const auto add = [&](std::size_t texel, float lambert_weight, float lobe_weight) {
+    lambert[texel] += lambert_weight;
+    if (phong) lobe[texel] += lobe_weight;
+  };
+  const auto flush = [&] {
+    if (waiting == 0) return;
+    const unsigned lanes = (1u << waiting) - 1;
+    const unsigned blocked = visibility_.occluded8(point.origin, x, y, z, lanes);
+    counts.shadow += waiting;
+    for (unsigned i = 0; i < waiting; ++i) {
+      if (!(blocked >> i & 1u)) add(texel_of[i], lambert_part[i], lobe_part[i]);
+    }
+    waiting = 0;
+  };
+
+  for (std::size_t w = 0; w < scratch.refine.size(); ++w) {
+    for (std::uint64_t bits = scratch.refine[w]; bits != 0; bits &= bits - 1) {
+      const std::size_t texel = 64 * w + static_cast<std::size_t>(std::countr_zero(bits));
+      const bool lit = phong && phong->reaches(texel);
+      if (lit) phong->weights(texel, scratch.lobe_weights);
+      for (std::size_t s = 0; s < samples; ++s) {
+        const DirectionTable::Sample& d = table_.sample[texel * samples + s];
+        const float cosine = normal.dot(d.x, d.y, d.z);
+        if (!(cosine > 0) || !(geometric.dot(d.x, d.y, d.z) > 0)) continue;
+        const float lambert_weight = cosine * d.solid_angle * inverse_pi;
+        const float lobe_weight = lit ? scratch.lobe_weights[s] : 0.0f;
+        if (s == 0) {  // traced in the first pass
+          if (get(scratch.visible, texel)) add(texel, lambert_weight, lobe_weight);
+          continue;
+        }
+        x[waiting] = d.x, y[waiting] = d.y, z[waiting] = d.z;
+        lambert_part[waiting] = lambert_weight, lobe_part[waiting] = lobe_weight;
+        texel_of[waiting] = texel;
+        if (++waiting == 8) flush();
+      }
+    }
+  }
+  flush();
+}
+
+void PointTracer::trace(const ShadingPoint& point, std::span<float> lambert, std::span<float> lobe,
+                        PointScratch& scratch, RayCounts& counts,
+                        const GroupFlags& free_groups) const {
+  const std::size_t words = (table_.texels() + 63) / 64;
+  scratch.known.assign(words, 0);
+  scratch.visible.assign(words, 0);
+  scratch.refine.assign(words, 0);
+  scratch.lobe_weights.resize(static_cast<std::size_t>(table_.samples));
+  std::fill(lambert.begin(), lambert.end(), 0.0f);
+  if (point.glossy) std::fill(lobe.begin(), lobe.end(), 0.0f);
+  ++counts.points;
+
+  first_pass(point, scratch, counts, free_groups);
+  if (adaptive_) {
+    if (table_.samples > 1) mark_differences(scratch);
+  } else {
+    for (std::size_t w = 0; w < words; ++w) scratch.refine[w] |= scratch.known[w];
+  }
+
+  std::optional<PhongLobe> phong;
+  if (point.glossy) phong.emplace(table_, point.mirror, point.normal, point.exponent);
+
+  // Texels wholly above both horizons, all of one visibility.
+  const FloatVec normal(point.normal * (1 / kPi));
+  for (std::size_t w = 0; w < words; ++w) {
+    const std::uint64_t sure = scratch.visible[w] & ~scratch.refine[w];
+    const std::size_t end = std::min(table_.texels(), 64 * w + 64);
+    if (sure == 0) continue;
+    for (std::size_t k = 64 * w; k < end; ++k) {
+      const float whole = normal.dot(table_.moment_x[k], table_.moment_y[k], table_.moment_z[k]);
+      lambert[k] = (sure >> (k % 64) & 1) ? whole : 0.0f;
+    }
+    if (!phong) continue;
+    for (std::uint64_t bits = sure; bits != 0; bits &= bits - 1) {
+      const std::size_t k = 64 * w + static_cast<std::size_t>(std::countr_zero(bits));
+      if (!phong->reaches(k)) continue;
+      phong->weights(k, scratch.lobe_weights);
+      float sum = 0;
+      for (const float part : scratch.lobe_weights) sum += part;
+      lobe[k] = sum;
+    }
+  }
+  refine(point, phong ? &*phong : nullptr, lambert, lobe, scratch, counts);
+}
+
+}  // namespace haarlight

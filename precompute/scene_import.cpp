@@ -1,0 +1,366 @@
+// Scenes from files: glTF, GLB, OBJ and PLY.
+
+#include "precompute/scene_import.h"
+
+#include <assimp/GltfMaterial.h>
+#include <assimp/material.h>
+#include <assimp/mesh.h>
+#include <assimp/scene.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <assimp/Importer.hpp>
+#include <cctype>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <span>
+#include <string>
+
+#include "core/error.h"
+#include "core/image_io.h"
+#include "precompute/gltf_camera.h"
+#include "precompute/ply_check.h"
+#include "precompute/polygon.h"
+#include "precompute/scene_clean.h"
+
+namespace haarlight {
+namespace {
+
+enum class FileType { gltf, obj, ply, other };
+
+FileType file_type(const std::filesystem::path& file) {
+  std::string suffix = file.extension().string();
+  std::transform(suffix.begin(), suffix.end(), suffix.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (suffix == ".gltf" || suffix == ".glb") return FileType::gltf;
+  if (suffix == ".obj") return FileType::obj;
+  if (suffix == ".ply") return FileType::ply;
+  return FileType::other;
+}
+
+// assimp's reason as part of a one-line message.
+std::string one_line(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return std::iscntrl(c) != 0; }, ' ');
+  while (!text.empty() && (text.back() == ' ' || text.back() == '.')) text.pop_back();
+  return text.empty() ? "no reason given" : text;
+}
+
+float unit(float value) { return value > 0 ? std::min(value, 1.0f) : 0.0f; }  // NaN becomes 0
+template <typename Color>
+Rgb unit_rgb(const Color& c) {
+  return {unit(c.r), unit(c.g), unit(c.b)};
+}
+
+float srgb_to_linear(float c) {
+  return c <= 0.04045f ? c / 12.92f : std::pow((c + 0.055f) / 1.055f, 2.4f);
+}
+
+// ---- materials ----------------------------------------------------------------------------------
+
+// A picture inside the scene file, decoded by way of a temporary file.
+Image load_embedded(const aiTexture& texture) {
+  if (texture.mHeight != 0) {  // plain 8-bit texels, sRGB
+    Image image(static_cast<int>(texture.mWidth), static_cast<int>(texture.mHeight));
+    for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+      const aiTexel& t = texture.pcData[i];
+      const auto linear = [](unsigned char c) {
+        return srgb_to_linear(static_cast<float>(c) / 255.0f);
+      };
+      image.pixels[i] = {linear(t.r), linear(t.g), linear(t.b)};
+    }
+    return image;
+  }
+  std::string suffix = ".";
+  suffix += texture.achFormatHint[0] != '\0' ? texture.achFormatHint : "png";
+  std::string name =
+      (std::filesystem::temp_directory_path() / ("haarlight-texture-XXXXXX" + suffix)).string();
+  const int descriptor = mkstemps(name.data(), static_cast<int>(suffix.size()));
+  if (descriptor < 0) {
+    throw Error(ErrorKind::io, fmt::format("{}: cannot be created to decode a texture", name));
+  }
+  close(descriptor);
+  struct Remove {
+    const std::string& name;
+    ~Remove() {
+      std::error_code ignored;
+      std::filesystem::remove(name, ignored);
+    }
+  } const remove{name};
+  std::ofstream out(name, std::ios::binary);
+  out.write(reinterpret_cast<const char*>(texture.pcData),
+            static_cast<std::streamsize>(texture.mWidth));
+  out.close();
+  if (!out) {
+    throw Error(ErrorKind::io, fmt::format("{}: cannot be written to decode a texture", name));
+  }
+  return load_image(name);
+}
+
+// The base colour textures of one file, each read once.
+class Textures {
+ public:
+  Textures(const aiScene& file, const std::filesystem::path& folder, Scene& scene)
+      : file_(file), folder_(folder), scene_(scene) {}
+
+  // Index into scene.texture, or -1.
+  int index(const aiMaterial& material) {
+    aiString path;
+    if (material.GetTexture(aiTextureType_BASE_COLOR, 0, &path) != aiReturn_SUCCESS &&
+        material.GetTexture(aiTextureType_DIFFUSE, 0, &path) != aiReturn_SUCCESS) {
+      return -1;
+    }
+    const auto [at, is_new] = known_.try_emplace(path.C_Str(), -1);
+    if (!is_new) return at->second;
+    try {
+      const aiTexture* embedded = file_.GetEmbeddedTexture(path.C_Str());
+      Image image = embedded ? load_embedded(*embedded) : load_from_folder(path.C_Str());
+      for (Rgb& p : image.pixels) p = unit_rgb(p);
+      scene_.texture.push_back(std::move(image));
+      at->second = static_cast<int>(scene_.texture.size()) - 1;
+    } catch (const Error&) {
+      ++scene_.report.textures_missing;
+    }
+    return at->second;
+  }
+
+ private:
+  Image load_from_folder(std::string name) const {
+    std::replace(name.begin(), name.end(), '\\', '/');  // as files from Windows have it
+    return load_image(folder_ / name);
+  }
+
+  const aiScene& file_;
+  std::filesystem::path folder_;
+  Scene& scene_;
+  std::map<std::string, int> known_;
+};
+
+Material obj_material(const aiMaterial& in) {
+  Material out;
+  aiColor3D color;
+  float value = 0;
+  if (in.Get(AI_MATKEY_COLOR_DIFFUSE, color) == aiReturn_SUCCESS) out.albedo = unit_rgb(color);
+  if (in.Get(AI_MATKEY_COLOR_SPECULAR, color) == aiReturn_SUCCESS) out.specular = unit_rgb(color);
+  if (in.Get(AI_MATKEY_SHININESS, value) == aiReturn_SUCCESS) {
+    out.exponent = value > 0 ? std::min(value, 1e4f) : 0.0f;
+  }
+  return out;
+}
+
+// See the header for the formulas.
+Material gltf_material(const aiMaterial& in) {
+  aiColor4D base(1, 1, 1, 1);
+  float metallic = 1, roughness = 1;
+  in.Get(AI_MATKEY_BASE_COLOR, base);
+  in.Get(AI_MATKEY_METALLIC_FACTOR, metallic);
+  in.Get(AI_MATKEY_ROUGHNESS_FACTOR, roughness);
+  const Rgb color = unit_rgb(base);
+  metallic = unit(metallic);
+  const double a = static_cast<double>(unit(roughness)) * static_cast<double>(unit(roughness));
+  const double exponent = std::min((2 / std::max(a * a, 1e-12) - 2) / 4, 1e4);
+
+  Material out;
+  out.albedo = color * (1 - metallic);
+  out.specular = Rgb{0.04f, 0.04f, 0.04f} * (1 - metallic) + color * metallic;
+  out.exponent = static_cast<float>(exponent);
+  constexpr double kNarrowEnough = 4;
+  if (exponent < kNarrowEnough) {
+    out.albedo = unit_rgb(out.albedo + out.specular);
+    out.specular = {0, 0, 0};
+  }
+  return out;
+}
+
+Material import_material(const aiMaterial& in, unsigned index, FileType type,
+                         std::size_t gltf_materials, bool tinted) {
+  const std::string name = in.GetName().C_Str();
+  Material out;
+  const bool is_default = type == FileType::gltf ? index >= gltf_materials
+                          : type == FileType::ply
+                              ? name.empty()
+                              : name.empty() || name == AI_DEFAULT_MATERIAL_NAME;
+  if (is_default) {
+    if (tinted) out.albedo = {1, 1, 1};  // the colour is in the vertices
+    out.name = "default";
+    return out;
+  }
+  out = type == FileType::gltf ? gltf_material(in) : obj_material(in);
+  out.name = name;
+  return out;
+}
+
+// ---- meshes -------------------------------------------------------------------------------------
+
+Vec3 vec(const aiVector3D& v) {
+  return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
+}
+
+// A node's transform in double.
+struct Transform {
+  Vec3 row[3];
+  Vec3 move;
+
+  explicit Transform(const aiMatrix4x4& m)
+      : row{vec({m.a1, m.a2, m.a3}), vec({m.b1, m.b2, m.b3}), vec({m.c1, m.c2, m.c3})},
+        move(vec({m.a4, m.b4, m.c4})) {}
+  Transform() : Transform(aiMatrix4x4()) {}
+
+  Vec3 direction(const Vec3& v) const { return {dot(row[0], v), dot(row[1], v), dot(row[2], v)}; }
+  Vec3 point(const Vec3& v) const { return direction(v) + move; }
+  double determinant() const { return dot(row[0], cross(row[1], row[2])); }
+  // By the cofactors: the inverse transposed up to a factor, which the caller divides out.
+  Vec3 normal(const Vec3& v) const {
+    const double sign = determinant() < 0 ? -1 : 1;
+    return sign * Vec3{dot(cross(row[1], row[2]), v), dot(cross(row[2], row[0]), v),
+                       dot(cross(row[0], row[1]), v)};
+  }
+  Transform operator*(const Transform& first) const {
+    Transform t;
+    const Vec3 column[3] = {{first.row[0].x, first.row[1].x, first.row[2].x},
+                            {first.row[0].y, first.row[1].y, first.row[2].y},
+                            {first.row[0].z, first.row[1].z, first.row[2].z}};
+    for (int i = 0; i < 3; ++i) {
+      t.row[i] = {dot(row[i], column[0]), dot(row[i], column[1]), dot(row[i], column[2])};
+    }
+    t.move = point(first.move);
+    return t;
+  }
+};
+
+void add_vertices(const aiMesh& mesh, const Transform& transform, FileType type, Scene& scene) {
+  const std::size_t before = scene.position.size();
+  const std::size_t count = mesh.mNumVertices;
+  if (before + count > std::numeric_limits<std::uint32_t>::max()) {
+    throw Error(ErrorKind::format,
+                fmt::format("{}: {} vertices, expected below 2^32", scene.name, before + count));
+  }
+  const bool tinted = mesh.HasVertexColors(0);
+  if (tinted && scene.tint.empty()) scene.tint.assign(before, Rgb{1, 1, 1});
+  for (unsigned v = 0; v < mesh.mNumVertices; ++v) {
+    scene.position.push_back(transform.point(vec(mesh.mVertices[v])));
+    Vec3 normal;  // zero: to be made
+    if (mesh.HasNormals()) {
+      normal = transform.normal(vec(mesh.mNormals[v]));
+      const double size = length(normal);
+      normal = size > 0 && std::isfinite(size) ? normal * (1 / size) : Vec3{};
+    }
+    scene.normal.push_back(normal);
+    std::array<float, 2> uv{};
+    if (mesh.HasTextureCoords(0)) {
+      uv = {mesh.mTextureCoords[0][v].x, mesh.mTextureCoords[0][v].y};
+    }
+    scene.uv.push_back(uv);
+    if (tinted) {
+      Rgb tint = unit_rgb(mesh.mColors[0][v]);
+      if (type == FileType::ply) {
+        tint = {srgb_to_linear(tint.r), srgb_to_linear(tint.g), srgb_to_linear(tint.b)};
+      }
+      scene.tint.push_back(tint);
+    } else if (!scene.tint.empty()) {
+      scene.tint.push_back({1, 1, 1});
+    }
+  }
+}
+
+void add_mesh(const aiMesh& mesh, const Transform& transform, FileType type, Scene& scene) {
+  const auto first = static_cast<std::uint32_t>(scene.position.size());
+  add_vertices(mesh, transform, type, scene);
+  const bool mirrored = transform.determinant() < 0;
+  std::vector<Vec3> corners;
+  for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
+    const aiFace& face = mesh.mFaces[f];
+    corners.clear();
+    for (unsigned c = 0; c < face.mNumIndices; ++c) {
+      if (face.mIndices[c] >= mesh.mNumVertices) {
+        throw Error(ErrorKind::format,
+                    fmt::format("{}: face {} names vertex {}, expected below {}", scene.name, f,
+                                face.mIndices[c], mesh.mNumVertices));
+      }
+      corners.push_back(scene.position[first + face.mIndices[c]]);
+    }
+    if (corners.size() < 3) {
+      ++scene.report.dropped_not_triangle;
+      continue;
+    }
+    for (const auto& t : triangulate(corners)) {
+      Triangle triangle;
+      triangle.material = mesh.mMaterialIndex;
+      for (std::size_t c = 0; c < 3; ++c) {
+        triangle.vertex[mirrored ? 2 - c : c] = first + face.mIndices[t[c]];
+      }
+      scene.triangle.push_back(triangle);
+    }
+  }
+}
+
+void add_nodes(const aiScene& file, FileType type, Scene& scene) {
+  struct Visit {
+    const aiNode* node;
+    Transform above;
+  };
+  std::vector<Visit> todo{{file.mRootNode, Transform()}};
+  while (!todo.empty()) {
+    const Visit here = todo.back();
+    todo.pop_back();
+    const Transform transform = here.above * Transform(here.node->mTransformation);
+    for (unsigned i = 0; i < here.node->mNumMeshes; ++i) {
+      add_mesh(*file.mMeshes[here.node->mMeshes[i]], transform, type, scene);
+    }
+    for (unsigned i = here.node->mNumChildren; i > 0; --i) {
+      todo.push_back({here.node->mChildren[i - 1], transform});
+    }
+  }
+}
+
+}  // namespace
+
+Scene import_scene(const std::filesystem::path& file) {
+  std::error_code code;
+  if (!std::filesystem::exists(file, code)) {
+    throw Error(ErrorKind::missing, fmt::format("{}: no such file, expected a glTF, OBJ or PLY "
+                                                "scene",
+                                                file.string()));
+  }
+  if (!std::filesystem::is_regular_file(file, code)) {
+    throw Error(ErrorKind::format,
+                fmt::format("{}: not a file, expected a glTF, OBJ or PLY scene", file.string()));
+  }
+  const FileType type = file_type(file);
+  if (type == FileType::other) {
+    throw Error(ErrorKind::format, fmt::format("{}: suffix is \"{}\", expected .gltf, .glb, .obj "
+                                               "or .ply",
+                                               file.string(), file.extension().string()));
+  }
+  GltfExtras extras;
+  if (type == FileType::gltf) extras = read_gltf_extras(file);
+
+  // No post-processing: what it drops or alters it does not say.
+  Assimp::Importer importer;
+  const aiScene* read = importer.ReadFile(file.string(), 0);
+  if (!read || !read->mRootNode) {
+    throw Error(ErrorKind::format, fmt::format("{}: cannot be read as a scene ({}), expected a "
+                                               "glTF, OBJ or PLY file",
+                                               file.string(), one_line(importer.GetErrorString())));
+  }
+  if (type == FileType::ply) check_ply_length(file);
+
+  Scene scene;
+  scene.name = file.filename().string();
+  add_nodes(*read, type, scene);
+  Textures textures(*read, file.parent_path(), scene);
+  for (unsigned m = 0; m < read->mNumMaterials; ++m) {
+    scene.material.push_back(
+        import_material(*read->mMaterials[m], m, type, extras.materials, !scene.tint.empty()));
+    scene.material.back().texture = textures.index(*read->mMaterials[m]);
+  }
+  scene.camera = extras.camera;
+  clean_scene(scene);
+  return scene;
+}
+
+}  // namespace haarlight
