@@ -1,0 +1,162 @@
+// haarlight info: checks a transport file and says what is in it.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "apps/option_parsers.h"
+#include "apps/verbs.h"
+#include "prt/transport.h"
+
+namespace haarlight {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct ColumnSizes {
+  std::uint64_t least = 0, median = 0, most = 0;
+  double mean = 0;
+};
+
+ColumnSizes column_sizes(const Transport& transport) {
+  std::vector<std::uint64_t> bytes;
+  double sum = 0;
+  for (int j = 0; j < transport.layout().size(); ++j) {
+    bytes.push_back(transport.column_bytes(j));
+    sum += static_cast<double>(bytes.back());
+  }
+  std::sort(bytes.begin(), bytes.end());
+  return {bytes.front(), bytes[bytes.size() / 2], bytes.back(),
+          sum / static_cast<double>(bytes.size())};
+}
+
+/// How the file was made. A file of another program may hold anything here.
+Json parse_meta(const std::string& meta) {
+  Json parsed = Json::parse(meta, nullptr, false);
+  return parsed.is_object() ? parsed : Json::object();
+}
+
+Json describe(const std::filesystem::path& file, const Transport& transport) {
+  const TransportInfo& info = transport.info();
+  const ColumnSizes columns = column_sizes(transport);
+  const Vec3& position = info.camera.position;
+  const Vec3 forward = info.camera.orientation * Vec3{0, 0, -1};
+
+  Json bands = Json::array();
+  for (int b = 0; b < transport.layout().band_count(); ++b) {
+    std::uint64_t bytes = 0;
+    const IndexRange range = transport.layout().band(b);
+    for (int j = range.begin; j < range.end; ++j) bytes += transport.column_bytes(j);
+    bands.push_back({{"area_texels", transport.layout().area(b)},
+                     {"wavelets", range.size()},
+                     {"bytes", bytes}});
+  }
+
+  const std::span<const float> coverage = transport.coverage();
+  const auto covered =
+      std::count_if(coverage.begin(), coverage.end(), [](float share) { return share > 0; });
+  const std::span<const std::uint32_t> outputs = transport.row_output();
+  const auto rows = std::count_if(outputs.begin(), outputs.end(),
+                                  [](std::uint32_t output) { return output != kNoOutput; });
+
+  Json out;
+  out["file"] = file.string();
+  out["file_bytes"] = transport.file_bytes();
+  out["chunk_bytes"] = transport.chunk_bytes();
+  out["face_size"] = info.face_size;
+  out["coefficients"] = transport.layout().size();
+  out["width"] = info.width;
+  out["height"] = info.height;
+  out["rows"] = rows;
+  out["rows_stored"] = transport.rows();
+  out["pixels_covered"] = covered;
+  out["camera"] = {{"position_m", {position.x, position.y, position.z}},
+                   {"forward", {forward.x, forward.y, forward.z}},
+                   {"vertical_fov_degrees", info.camera.vertical_fov * 180 / kPi}};
+  out["column_bytes"] = {{"min", columns.least},
+                         {"median", columns.median},
+                         {"mean", columns.mean},
+                         {"max", columns.most}};
+  out["bands"] = bands;
+  out["checksums"] = "verified";  // Transport::open throws when one is wrong
+  out["made"] = parse_meta(info.meta);
+  return out;
+}
+
+std::string mebibytes(double bytes) { return fmt::format("{:.2f} MiB", bytes / (1024.0 * 1024.0)); }
+std::string kibibytes(double bytes) { return fmt::format("{:.1f} KiB", bytes / 1024.0); }
+
+void print_text(const Json& d) {
+  const auto line = [](const std::string& name, const std::string& value) {
+    fmt::print("{:<22}{}\n", name, value);
+  };
+  line("file", fmt::format("{}, {}", d["file"].get<std::string>(), mebibytes(d["file_bytes"])));
+  line("picture", fmt::format("{}x{} pixels, {} of them show the scene", d["width"].get<int>(),
+                              d["height"].get<int>(), d["pixels_covered"].get<std::int64_t>()));
+  line("lighting", fmt::format("6x{0}x{0} texels, {1} coefficients", d["face_size"].get<int>(),
+                               d["coefficients"].get<int>()));
+  const Json& camera = d["camera"];
+  line("camera",
+       fmt::format("at ({:.4g}, {:.4g}, {:.4g}) m, towards ({:.3f}, {:.3f}, {:.3f}), "
+                   "vertical field of view {:.2f} degrees",
+                   camera["position_m"][0].get<double>(), camera["position_m"][1].get<double>(),
+                   camera["position_m"][2].get<double>(), camera["forward"][0].get<double>(),
+                   camera["forward"][1].get<double>(), camera["forward"][2].get<double>(),
+                   camera["vertical_fov_degrees"].get<double>()));
+  line("rows", fmt::format("{} pixels in {} stored rows", d["rows"].get<std::int64_t>(),
+                           d["rows_stored"].get<int>()));
+  const Json& columns = d["column_bytes"];
+  line("columns", fmt::format("{} together; one is {} in the mean, {} to {}, median {}",
+                              mebibytes(d["chunk_bytes"]), kibibytes(columns["mean"]),
+                              kibibytes(columns["min"]), kibibytes(columns["max"]),
+                              kibibytes(columns["median"])));
+  int band = 0;
+  for (const Json& b : d["bands"]) {
+    line(fmt::format("  band {}", band++),
+         fmt::format("{:>6} wavelets of {:>4} texels, {}", b["wavelets"].get<int>(),
+                     b["area_texels"].get<int>(), mebibytes(b["bytes"])));
+  }
+  if (d["made"].contains("measured_error") && d["made"]["measured_error"].is_number()) {
+    line("measured error",
+         fmt::format("{:.3g} of the picture, relative RMSE, worst of the built-in lightings",
+                     d["made"]["measured_error"].get<double>()));
+  }
+  line("checksums", "verified, every byte");
+  for (const auto& [key, value] : d["made"].items()) {
+    if (key != "measured_error") line("made: " + key, value.dump());
+  }
+}
+
+struct InfoCommand {
+  std::filesystem::path file;
+  bool json = false;
+
+  void run() const {
+    const Json description = describe(file, Transport::open(file));
+    if (json) {
+      fmt::print("{}\n", description.dump(2));
+    } else {
+      print_text(description);
+    }
+  }
+};
+
+}  // namespace
+
+Verb add_info(CLI::App& verb) {
+  auto command = std::make_shared<InfoCommand>();
+  add_path(verb, "FILE", command->file, "FILE.hlt", "transport file")->required();
+  verb.add_flag("--json", command->json, "print JSON; sizes in bytes, lengths in metres");
+  verb.footer(
+      "\nEvery byte is checked first: a damaged file is refused with what is wrong.\n\n"
+      "Example:\n  haarlight info bunny.hlt --json");
+  return [command] { command->run(); };
+}
+
+}  // namespace haarlight

@@ -1,0 +1,26 @@
+// Turns SIGINT and SIGTERM into a flag.
+
+#include "apps/interrupt.h"
+
+#include <csignal>
+
+namespace haarlight {
+namespace {
+
+volatile std::sig_atomic_t g_interrupted = 0;
+
+void on_signal(int signal_number) {
+  g_interrupted = 1;
+  std::signal(signal_number, SIG_DFL);
+}
+
+}  // namespace
+
+void catch_interrupts() {
+  std::signal(SIGINT, on_signal);
+  std::signal(SIGTERM, on_signal);
+}
+
+bool interrupted() { return g_interrupted != 0; }
+
+}  // namespace haarlight

@@ -1,0 +1,37 @@
+// Prints the reports of importers.
+
+#include "apps/repairs.h"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+
+namespace haarlight {
+namespace {
+
+void print_count(const std::filesystem::path& file, std::int64_t count, const char* what) {
+  if (count > 0) fmt::print(stderr, "{}: {} {}\n", file.string(), count, what);
+}
+
+}  // namespace
+
+void print_repairs(const std::filesystem::path& file, const EnvironmentReport& report) {
+  if (report.negative_pixels > 0) {
+    fmt::print(stderr, "{}: {} pixels with negative radiance (down to {:.4g}) set to 0\n",
+               file.string(), report.negative_pixels, report.smallest);
+  }
+  print_count(file, report.not_finite_pixels, "pixels that are not finite set to 0");
+}
+
+void print_repairs(const std::filesystem::path& file, const SceneReport& report) {
+  print_count(file, report.dropped_degenerate, "triangles without area dropped");
+  print_count(file, report.dropped_not_finite,
+              "triangles with a corner that is not finite dropped");
+  print_count(file, report.dropped_duplicate, "repeated triangles dropped");
+  print_count(file, report.dropped_not_triangle, "points and lines left out");
+  print_count(file, report.unused_vertices, "unused vertices left out");
+  print_count(file, report.normals_made, "vertex normals made");
+  print_count(file, report.textures_missing, "textures not found, plain colours used");
+}
+
+}  // namespace haarlight

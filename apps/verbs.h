@@ -1,0 +1,19 @@
+// The verbs of the program. Each adds itself to the command line; its work runs when main asks.
+
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+
+namespace haarlight {
+
+/// The work of a verb, its options parsed: throws Error, or CLI::ValidationError where options
+/// contradict each other.
+using Verb = std::function<void()>;
+
+Verb add_precompute(CLI::App& verb);
+Verb add_relight(CLI::App& verb);
+Verb add_compare(CLI::App& verb);
+Verb add_info(CLI::App& verb);
+
+}  // namespace haarlight

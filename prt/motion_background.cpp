@@ -1,0 +1,81 @@
+// Draws the moving light behind the scene.
+
+#include "prt/motion_background.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "core/parallel.h"
+#include "prt/image_relighter.h"
+
+namespace haarlight {
+namespace {
+
+constexpr int kDiscSamples = 4;  // on an axis of a pixel, for a smooth rim
+
+/// composite_environment of `environment` times `factor`. What that adds is linear in radiance, so
+/// that lights can be drawn one after the other.
+void add_environment(const Transport& transport, const Environment& environment, double factor,
+                     Image& picture) {
+  if (factor <= 0) return;
+  const EnvironmentOptions options{.projection = environment.projection(), .scale = factor};
+  composite_environment(transport, Environment(environment.picture(), options), {}, picture);
+}
+
+void add_disc(const Transport& transport, const Vec3& center, Image& picture) {
+  const Camera& camera = transport.info().camera;
+  parallel_for(picture.height, [&](int y) {
+    for (int x = 0; x < picture.width; ++x) {
+      int inside = 0;
+      for (int j = 0; j < kDiscSamples; ++j) {
+        for (int i = 0; i < kDiscSamples; ++i) {
+          const Vec3 direction =
+              camera.direction(x + (i + 0.5) / kDiscSamples, y + (j + 0.5) / kDiscSamples);
+          inside += dot(direction, center) >= kDiscCosine;
+        }
+      }
+      const double share = static_cast<double>(inside) / (kDiscSamples * kDiscSamples);
+      const float uncovered = 1 - transport.coverage()[picture.index(x, y)];
+      const float light = static_cast<float>(kDiscRadiance * share) * uncovered;
+      picture.at(x, y) += Rgb(light, light, light);
+    }
+  });
+}
+
+}  // namespace
+
+void composite_motion_background(const Transport& transport, const MotionOptions& options,
+                                 int frame, const Environment& from, const Environment* to,
+                                 Image& picture) {
+  if (picture.width != transport.width() || picture.height != transport.height()) {
+    throw Error(ErrorKind::invalid_argument,
+                fmt::format("picture is {}x{}, expected {}x{} as the transport", picture.width,
+                            picture.height, transport.width(), transport.height()));
+  }
+  switch (options.kind) {
+    case MotionKind::blend: {
+      if (to == nullptr) {
+        throw Error(ErrorKind::invalid_argument,
+                    "blend has one environment, expected a second one to blend to");
+      }
+      const double t = static_cast<double>(std::min(frame, options.stop)) / options.stop;
+      add_environment(transport, from, 1 - t, picture);
+      add_environment(transport, *to, t, picture);
+      break;
+    }
+    case MotionKind::light:
+      add_environment(transport, from, kDiscBackgroundShare, picture);
+      add_disc(transport, motion_disc_center(options, frame), picture);
+      break;
+    case MotionKind::still:
+    case MotionKind::rotate:
+    case MotionKind::tumble:
+    case MotionKind::swing:
+      composite_environment(transport, from, motion_rotation(options, frame), picture);
+      break;
+  }
+}
+
+}  // namespace haarlight
