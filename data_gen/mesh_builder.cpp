@@ -49,7 +49,6 @@ void MeshBuilder::add_grid(std::uint32_t material, int columns, int rows,
   // Area-weighted normals; a triangle with two equal corners (a pole, a tip) is left out.
   std::vector<std::array<std::size_t, 3>> triangles;
   const auto add = [&](std::size_t a, std::size_t b, std::size_t c) {
-    if (point[a] == point[b] || point[b] == point[c] || point[c] == point[a]) return;
     const Vec3 area = cross(point[b] - point[a], point[c] - point[a]);
     if (is_zero(area)) return;
     for (const std::size_t corner : {a, b, c}) normal[corner] = normal[corner] + area;

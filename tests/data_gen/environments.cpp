@@ -106,15 +106,19 @@ TEST(Environments, AnotherSeedIsAnotherLight) {
 }
 
 TEST(Environments, PixelsAreMeansOfTheModel) {
-  // A half black, half white sky: a pixel row across the horizon between two rows is all of one
-  // side; with an odd number of rows the middle one is half and half exactly.
+  // Light that is linear in the place on the lat-long map has its value at a pixel's middle as the
+  // pixel's mean. Azimuth jumps at the border, which no pixel crosses.
   EnvironmentModel model;
-  model.smooth = [](const Vec3& d) { return d.y > 0 ? RgbD{1, 1, 1} : RgbD{}; };
-  const Image image = draw_environment(model, Projection::latlong, 18);
-  for (int x = 0; x < 18; ++x) {
-    EXPECT_EQ(image.at(x, 3), (Rgb{1, 1, 1}));
-    EXPECT_EQ(image.at(x, 4), (Rgb{0.5f, 0.5f, 0.5f}));
-    EXPECT_EQ(image.at(x, 5), (Rgb{0, 0, 0}));
+  model.smooth = [](const Vec3& d) {
+    return RgbD{std::acos(d.y) / kPi, 0.5 + std::atan2(d.x, -d.z) / (2 * kPi), 1};
+  };
+  const Image image = draw_environment(model, Projection::latlong, 36);
+  for (int y = 0; y < 18; ++y) {
+    for (int x = 0; x < 36; ++x) {
+      EXPECT_NEAR(image.at(x, y).r, (y + 0.5) / 18, 1e-6) << x << " " << y;
+      EXPECT_NEAR(image.at(x, y).g, (x + 0.5) / 36, 1e-6) << x << " " << y;
+      EXPECT_EQ(image.at(x, y).b, 1.0f) << x << " " << y;
+    }
   }
 }
 
