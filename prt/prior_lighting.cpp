@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <map>
+#include <mutex>
 
 #include "core/vec.h"
 #include "wavelet/cubemap.h"
@@ -128,9 +130,7 @@ std::vector<float> coefficients_of(const HaarLayout& layout, const Radiance& rad
   return out;
 }
 
-}  // namespace
-
-std::vector<std::vector<float>> prior_lightings(const HaarLayout& layout) {
+std::vector<std::vector<float>> make_lightings(const HaarLayout& layout) {
   std::vector<std::vector<float>> all;
   for (const Radiance& radiance :
        {sun_and_sky(0.9), sun_and_sky(0.35), lamps_in_a_room(24, 0.1, 0.3, 11),
@@ -139,6 +139,18 @@ std::vector<std::vector<float>> prior_lightings(const HaarLayout& layout) {
     all.push_back(coefficients_of(layout, radiance));
   }
   return all;
+}
+
+}  // namespace
+
+const std::vector<std::vector<float>>& prior_lightings(const HaarLayout& layout) {
+  // A quarter of a second to make, so each size is made once.
+  static std::mutex mutex;
+  static std::map<int, std::vector<std::vector<float>>> made;
+  const std::lock_guard lock(mutex);
+  auto& entry = made[layout.face_size()];
+  if (entry.empty()) entry = make_lightings(layout);
+  return entry;
 }
 
 }  // namespace haarlight

@@ -10,7 +10,8 @@ namespace haarlight {
 
 /// Haar coefficients of grey environments of the kinds people use: a high and a low sun under a
 /// sky, a room with small lamps (two of them), windows, a dark room with one lamp, soft clouds,
-/// leaves against a bright sky. Each is layout.size() long. Deterministic.
-std::vector<std::vector<float>> prior_lightings(const HaarLayout& layout);
+/// leaves against a bright sky. Each is layout.size() long. Deterministic; made once
+/// a face size and kept, so the reference stays good.
+const std::vector<std::vector<float>>& prior_lightings(const HaarLayout& layout);
 
 }  // namespace haarlight

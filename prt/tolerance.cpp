@@ -105,7 +105,7 @@ struct ToleranceTuner::State {
   }
   HaarLayout layout;
   double error;
-  std::vector<std::vector<float>> lightings;
+  const std::vector<std::vector<float>>& lightings;
   // Squared picture error if all blocks below each level were dropped.
   std::vector<std::array<double, kLevels>> errors;
   std::vector<double> energies;

@@ -113,12 +113,16 @@ struct TransportWriter::State {
   HaarLayout layout;
   std::vector<std::uint32_t> row_order;
   int tiles = 0;
-  std::vector<std::vector<float>> lightings;
+  const std::vector<std::vector<float>>& lightings;
   std::optional<TileJournal> journal;
   bool finished = false;
 
   State(std::filesystem::path f, TransportInfo i, TransportWriterOptions o)
-      : file(std::move(f)), info(std::move(i)), options(std::move(o)), layout(info.face_size) {}
+      : file(std::move(f)),
+        info(std::move(i)),
+        options(std::move(o)),
+        layout(info.face_size),
+        lightings(prior_lightings(layout)) {}
 };
 
 TransportWriter::TransportWriter(const std::filesystem::path& file, TransportInfo info,
@@ -133,7 +137,6 @@ TransportWriter::TransportWriter(const std::filesystem::path& file, TransportInf
   }
   s.row_order = image_row_order(s.info.width, s.info.height);
   s.tiles = ((s.info.width + 7) / 8) * ((s.info.height + 7) / 8);
-  s.lightings = prior_lightings(s.layout);
   std::string fingerprint = s.options.fingerprint;
   fingerprint += fmt::format("|{}x{}x{}|", s.info.face_size, s.info.width, s.info.height);
   for (float threshold : s.options.thresholds) fingerprint += fmt::format("{:a},", threshold);

@@ -1,0 +1,157 @@
+// Small transports and lightings for tests, and slow, plainly right products with them.
+
+#pragma once
+
+#include <unistd.h>
+
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "core/rgb.h"
+#include "prt/tile_codec.h"
+#include "prt/transport.h"
+#include "prt/transport_writer.h"
+
+namespace haarlight::fixtures {
+
+/// A folder of its own that goes away with the test.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string pattern =
+        (std::filesystem::temp_directory_path() / "haarlight-test-XXXXXX").string();
+    path_ = ::mkdtemp(pattern.data());
+  }
+  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// Rows whose entries fall off with the band and are about `density` full, some blocks RGB. Entries
+/// differ from row to row, as no real transport's do: the worst case for the coder.
+inline TileRows random_tile(const HaarLayout& layout, std::mt19937_64& random, double density,
+                            bool colored) {
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const auto size = static_cast<std::size_t>(layout.size());
+  TileRows tile;
+  tile.rgb_blocks = colored ? static_cast<unsigned>(random() % 16) : 0;
+  const std::size_t channels = tile.rgb_blocks ? 3 : 1;
+  tile.values.resize(channels * kTileRows * size);
+  for (std::size_t j = 0; j < size; ++j) {
+    const double fall = std::exp2(-layout.band_of(static_cast<int>(j)));
+    for (std::size_t block = 0; block < kTileBlocks; ++block) {
+      const bool filled = uniform(random) < 2 * density - 1;
+      for (std::size_t ch = 0; ch < (tile.rgb_blocks >> block & 1 ? 3u : 1u); ++ch) {
+        for (std::size_t r = 0; r < kBlockRows; ++r) {
+          tile.values[(ch * kTileRows + block * kBlockRows + r) * size + j] =
+              filled ? static_cast<float>(0.1 * fall * uniform(random)) : 0.0f;
+        }
+      }
+    }
+  }
+  for (std::size_t r = 0; r < kTileRows; ++r) {
+    const auto part = [&] { return static_cast<float>(0.5 + 0.5 * uniform(random)); };
+    const bool rgb = tile.rgb_blocks >> (r / kBlockRows) & 1;
+    tile.color.push_back(rgb ? Rgb{1, 1, 1} : Rgb{part(), part(), part()});
+    tile.coverage.push_back(part());
+  }
+  return tile;
+}
+
+/// Rows as real ones are: non-negative texel weights that add up to 1, so that a sky of radiance 1
+/// gives a picture of 1, half of the texels shadowed at random; in wavelets.
+inline TileRows unit_tile(const HaarLayout& layout, std::mt19937_64& random) {
+  std::uniform_real_distribution<float> uniform(0, 1);
+  const auto size = static_cast<std::size_t>(layout.size());
+  TileRows tile;
+  tile.values.resize(kTileRows * size);
+  std::vector<float> texels(size);
+  for (std::size_t r = 0; r < kTileRows; ++r) {
+    double sum = 0;
+    for (float& t : texels) sum += t = std::max(0.0f, uniform(random) - 0.5f);
+    for (float& t : texels) t = static_cast<float>(t / sum);
+    haar_forward(layout, std::span<const float>(texels),
+                 std::span(tile.values).subspan(r * size, size));
+  }
+  tile.color.assign(kTileRows, Rgb{1, 1, 1});
+  tile.coverage.assign(kTileRows, 1.0f);
+  return tile;
+}
+
+struct SmallTransport {
+  TransportInfo info;
+  std::vector<TileRows> tiles;  // with padding tiles empty
+  std::vector<float> thresholds;
+};
+
+inline SmallTransport small_transport(int face, int width, int height, std::uint64_t seed,
+                                      double density = 0.4, bool colored = true,
+                                      float threshold = 0) {
+  const HaarLayout layout(face);
+  std::mt19937_64 random(seed);
+  SmallTransport out;
+  out.info.face_size = face;
+  out.info.width = width;
+  out.info.height = height;
+  out.info.camera.width = width;
+  out.info.camera.height = height;
+  out.tiles.resize(image_row_order(width, height).size() / kTileRows);
+  const auto real = static_cast<std::size_t>(((width + 7) / 8) * ((height + 7) / 8));
+  for (std::size_t t = 0; t < real; ++t) {
+    out.tiles[t] = random_tile(layout, random, density, colored);
+  }
+  out.thresholds.assign(static_cast<std::size_t>(layout.band_count()), threshold);
+  return out;
+}
+
+/// T as stored (dropped and rounded), dense: [output][channel][coefficient], colours applied.
+inline std::vector<double> dense(const SmallTransport& small) {
+  const HaarLayout layout(small.info.face_size);
+  const auto size = static_cast<std::size_t>(layout.size());
+  const auto order = image_row_order(small.info.width, small.info.height);
+  std::vector<double> out(3 * size * static_cast<std::size_t>(small.info.width) *
+                          static_cast<std::size_t>(small.info.height));
+  std::vector<float> values;
+  for (std::size_t t = 0; t < small.tiles.size(); ++t) {
+    if (small.tiles[t].values.empty()) continue;
+    const CompressedTile compressed = compress_tile(layout, small.tiles[t], small.thresholds);
+    decompress_tile(layout, compressed, values);
+    for (std::size_t r = 0; r < kTileRows; ++r) {
+      const std::uint32_t output = order[t * kTileRows + r];
+      if (output == kNoOutput) continue;
+      const bool rgb = compressed.rgb_blocks >> (r / kBlockRows) & 1;
+      const RgbD color(small.tiles[t].color[r]);
+      for (std::size_t ch = 0; ch < 3; ++ch) {
+        const double c = ch == 0 ? color.r : ch == 1 ? color.g : color.b;
+        for (std::size_t j = 0; j < size; ++j) {
+          out[(3 * output + ch) * size + j] =
+              c * static_cast<double>(values[((rgb ? ch : 0) * kTileRows + r) * size + j]);
+        }
+      }
+    }
+  }
+  return out;
+}
+
+/// Random lighting: most coefficients small, a few large, some exactly zero.
+inline std::vector<Rgb> random_lighting(const HaarLayout& layout, std::mt19937_64& random) {
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  std::vector<Rgb> out(static_cast<std::size_t>(layout.size()));
+  for (Rgb& c : out) {
+    const auto kind = random() % 8;
+    const float size = kind == 0 ? 100.0f : kind == 1 ? 0.0f : 1.0f;
+    c = {size * uniform(random), size * uniform(random), size * uniform(random)};
+  }
+  return out;
+}
+
+}  // namespace haarlight::fixtures
