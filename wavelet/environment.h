@@ -63,14 +63,14 @@ Environment load_environment(const std::filesystem::path& file,
 /// turns every cell and hands its energy to the texels below its footprint, across face edges too,
 /// then divides by the solid angle that arrived in the same way. So a constant environment stays
 /// constant, a light of one pixel keeps its energy within 2 % however it is turned, moves smoothly,
-/// and neither vanishes nor flickers. 28 bytes a cell.
+/// and neither vanishes nor flickers. 32 bytes a cell.
 class EnvironmentSampler {
  public:
   /// `face_size` is n, a power of two in [1, 1024]. Throws Error{invalid_argument} otherwise.
   EnvironmentSampler(const Environment& environment, int face_size);
 
   int face_size() const { return n_; }
-  std::size_t cell_count() const { return solid_angle_.size(); }
+  std::size_t cell_count() const { return light_.size(); }
 
   /// Mean radiance of each texel of the environment turned by `rotation`: light that came from
   /// direction d comes from rotation * d. `out` has n = face_size(), otherwise throws
@@ -79,19 +79,22 @@ class EnvironmentSampler {
   void project(const Rotation& rotation, Cubemap& out) const;
 
  private:
-  /// Sums of one texel: red, green, blue energy and solid angle.
-  struct alignas(16) TexelSum {
-    float part[4];
-  };
+  /// Red, green and blue energy and solid angle, of a cell or of what a texel got.
+  typedef float Sums __attribute__((vector_size(16)));
 
   void add_part(const Rotation& rotation, int part) const;
+  /// Texels of a part's sums, and what a 2 x 2 footprint at the last one touches.
+  std::size_t part_stride() const {
+    return 6 * texel_solid_angle_.size() + static_cast<std::size_t>(n_) + 1;
+  }
 
   int n_;
-  int parts_;                     // the cells are cut in as many runs, whatever the threads
-  std::vector<float> x_, y_, z_;  // unit direction of a cell's centre
-  std::vector<float> red_, green_, blue_;  // radiance x solid angle
-  std::vector<float> solid_angle_;
-  mutable std::vector<TexelSum> scratch_;  // [part][texel]
+  int parts_ = 0;                         // runs that the cells are cut in, whatever the threads
+  std::vector<float> x_, y_, z_;          // unit direction of a cell's centre
+  std::vector<float> width_;              // of a cell, in texels at the middle of a face
+  std::vector<Sums> light_;               // what a cell carries
+  std::vector<float> texel_solid_angle_;  // of one face, exact
+  mutable std::vector<Sums> scratch_;     // [part][texel]
 };
 
 /// One call: texel averages of `environment` turned by `rotation`.

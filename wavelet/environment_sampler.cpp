@@ -25,8 +25,8 @@ constexpr double kLeastCellsPerTexel = 4;
 /// Blur a merged block may add, as a share of one mean texel's energy times a texel's width.
 constexpr double kBlurShare = 0.005;
 
-constexpr int kBatch = 256;        // cells turned at once, small enough for the first cache
-constexpr int kStripTexels = 512;  // texels divided at once
+constexpr int kBatch = 256;         // cells turned at once, small enough for the first cache
+constexpr int kTexelsAtOnce = 512;  // finished by a thread at a time
 
 /// Where footprints of a batch lie: the first texel of 2 x 2, the share of the second column and
 /// row, or a mark that it reaches over an edge of the face.
@@ -47,12 +47,58 @@ struct RotationF {
   }
 };
 
-/// Half the width, in texels, of the box that stands for a square cell of `solid_angle` at (u, v).
-/// The map from the sphere to the face has J J^T = s (1 + p p^T) with p = (u, v) and s = 1 + p.p:
-/// a cell's spread along u is sqrt(s (1 + u^2)) times its width.
-inline float half_footprint(float solid_angle, float s, float coordinate, float half_n) {
-  const float width = half_n * std::sqrt(solid_angle * s * (1 + coordinate * coordinate));
-  return 0.5f * std::min(width, 1.0f);
+/// Half the width, in texels, of the box that stands for a square cell at (u, v); `width` is the
+/// cell's where a texel is 1 and the face is flat. The map from the sphere to the face has
+/// J J^T = s (1 + p p^T) with p = (u, v) and s = 1 + p.p: a cell's spread along u is
+/// sqrt(s (1 + u^2)) times its width. Never over a texel, so that it fits in 2 x 2.
+inline float half_footprint(float width, float s, float coordinate) {
+  return 0.5f * std::min(width * std::sqrt(s * (1 + coordinate * coordinate)), 1.0f);
+}
+
+/// Turns `count` cells and finds their faces and footprints: no branches, several cells an
+/// instruction.
+void place(const RotationF& turn, const float* __restrict px, const float* __restrict py,
+           const float* __restrict pz, const float* __restrict width, int count, int n,
+           Footprints& prints) {
+  const int face_texels = n * n;
+  const auto half_n = 0.5f * static_cast<float>(n), size = static_cast<float>(n);
+  int* __restrict const texel = prints.texel.data();
+  int* __restrict const crosses_edge = prints.crosses_edge.data();
+  float* __restrict const share_x = prints.share_x.data();
+  float* __restrict const share_y = prints.share_y.data();
+  for (int i = 0; i < count; ++i) {
+    const float x = turn.m[0] * px[i] + turn.m[1] * py[i] + turn.m[2] * pz[i];
+    const float y = turn.m[3] * px[i] + turn.m[4] * py[i] + turn.m[5] * pz[i];
+    const float z = turn.m[6] * px[i] + turn.m[7] * py[i] + turn.m[8] * pz[i];
+    const float ax = std::fabs(x), ay = std::fabs(y), az = std::fabs(z);
+    const bool on_x = (ax >= ay) & (ax >= az);
+    const bool on_y = !on_x & (ay >= az);
+    // The rows of the table in cubemap.h: the axis, and what runs along u and v on its positive
+    // side. On the negative side u turns around, except about Y, where v does.
+    const float not_x_axis = on_y ? y : z, not_y_u = on_x ? -z : x;
+    const float axis = on_x ? x : not_x_axis;
+    const float along_v = on_y ? z : -y;
+    const float scale = 1 / std::fabs(axis);
+    const float sign = axis < 0 ? -scale : scale;
+    const float u = not_y_u * (on_y ? scale : sign);
+    const float v = along_v * (on_y ? sign : scale);
+    const int pair = on_y ? 2 : 4;
+    const int face = (on_x ? 0 : pair) + (axis < 0 ? 1 : 0);
+
+    const float s = 1 + u * u + v * v;
+    const float half_x = half_footprint(width[i], s, u);
+    const float half_y = half_footprint(width[i], s, v);
+    const float middle_x = (u + 1) * half_n, middle_y = (v + 1) * half_n;
+    const float low_x = middle_x - half_x, high_x = middle_x + half_x;
+    const float low_y = middle_y - half_y, high_y = middle_y + half_y;
+    const int x0 = static_cast<int>(low_x), y0 = static_cast<int>(low_y);
+    const float over_x = (high_x - static_cast<float>(x0 + 1)) / (2 * half_x);
+    const float over_y = (high_y - static_cast<float>(y0 + 1)) / (2 * half_y);
+    texel[i] = face * face_texels + y0 * n + x0;
+    share_x[i] = over_x > 0 ? over_x : 0;
+    share_y[i] = over_y > 0 ? over_y : 0;
+    crosses_edge[i] = (low_x < 0) | (high_x >= size) | (low_y < 0) | (high_y >= size);
+  }
 }
 
 }  // namespace
@@ -80,36 +126,33 @@ EnvironmentSampler::EnvironmentSampler(const Environment& environment, int face_
     x_.push_back(static_cast<float>(cell.center.x));
     y_.push_back(static_cast<float>(cell.center.y));
     z_.push_back(static_cast<float>(cell.center.z));
-    red_.push_back(static_cast<float>(cell.energy.r));
-    green_.push_back(static_cast<float>(cell.energy.g));
-    blue_.push_back(static_cast<float>(cell.energy.b));
-    solid_angle_.push_back(static_cast<float>(cell.solid_angle));
+    width_.push_back(static_cast<float>(0.5 * n_ * std::sqrt(cell.solid_angle)));
+    light_.push_back(Sums{static_cast<float>(cell.energy.r), static_cast<float>(cell.energy.g),
+                          static_cast<float>(cell.energy.b), static_cast<float>(cell.solid_angle)});
   }
-  parts_ = n_ <= 128 ? 8 : n_ <= 256 ? 4 : 2;  // each has sums of its own for every texel
-  scratch_.resize(static_cast<std::size_t>(parts_) * 6 * static_cast<std::size_t>(n_) *
-                  static_cast<std::size_t>(n_));
+  for (const double solid_angle : cube_solid_angles(n_)) {
+    texel_solid_angle_.push_back(static_cast<float>(solid_angle));
+  }
+  // Each part has sums of its own for every texel: few where that is much memory, many where a
+  // texel has so many cells that rounding would show.
+  parts_ = n_ <= 8 ? 64 : n_ <= 128 ? 8 : n_ <= 256 ? 4 : 2;
+  scratch_.resize(static_cast<std::size_t>(parts_) * part_stride());
 }
 
 void EnvironmentSampler::add_part(const Rotation& rotation, int part) const {
   const auto n = static_cast<std::size_t>(n_);
-  const std::size_t texels = 6 * n * n;
-  TexelSum* const sums = scratch_.data() + static_cast<std::size_t>(part) * texels;
-  std::fill(sums, sums + texels, TexelSum{});
+  Sums* const sums = scratch_.data() + static_cast<std::size_t>(part) * part_stride();
+  std::fill(sums, sums + part_stride(), Sums{});
 
   const RotationF turn(rotation);
-  const int face_texels = n_ * n_;
   const auto half_n = 0.5f * static_cast<float>(n_), size = static_cast<float>(n_);
 
-  const auto add = [&](std::size_t cell, std::size_t texel, float weight) {
-    const float values[4] = {red_[cell], green_[cell], blue_[cell], solid_angle_[cell]};
-    for (int i = 0; i < 4; ++i) sums[texel].part[i] += weight * values[i];
-  };
   // A box of the footprint's size around (u, v) on `face`, cut off at the face's edges.
   const auto add_inside = [&](std::size_t cell, const CubePoint& p, float share) {
     const auto u = static_cast<float>(p.u), v = static_cast<float>(p.v);
-    const float s = 1 + u * u + v * v, solid_angle = share * solid_angle_[cell];
+    const float s = 1 + u * u + v * v, width = std::sqrt(share) * width_[cell];
     const auto spread = [&](float c, int& first, float& second_share) {
-      const float half = half_footprint(solid_angle, s, c, half_n), middle = (c + 1) * half_n;
+      const float half = half_footprint(width, s, c), middle = (c + 1) * half_n;
       const float low = std::max(middle - half, 0.0f), high = std::min(middle + half, size);
       first = std::min(static_cast<int>(low), n_ - 1);
       second_share =
@@ -122,7 +165,7 @@ void EnvironmentSampler::add_part(const Rotation& rotation, int part) const {
     for (int j = 0; j < 2; ++j) {
       for (int i = 0; i < 2; ++i) {
         const float weight = share * (i ? share_x : 1 - share_x) * (j ? share_y : 1 - share_y);
-        if (weight > 0) add(cell, cube_index(p.face, x + i, y + j, n_), weight);
+        if (weight > 0) sums[cube_index(p.face, x + i, y + j, n_)] += weight * light_[cell];
       }
     }
   };
@@ -135,8 +178,8 @@ void EnvironmentSampler::add_part(const Rotation& rotation, int part) const {
       double middle, share;
     };
     const auto cut = [&](float c, std::array<Piece, 2>& piece) {
-      const double half = static_cast<double>(half_footprint(solid_angle_[cell], s, c, half_n)) /
-                          static_cast<double>(half_n);
+      const double half =
+          static_cast<double>(half_footprint(width_[cell], s, c)) / static_cast<double>(half_n);
       const double low = static_cast<double>(c) - half, high = static_cast<double>(c) + half;
       const double inner_low = std::max(low, -1.0), inner_high = std::min(high, 1.0);
       const double outer = 1 - (inner_high - inner_low) / (2 * half);
@@ -162,47 +205,9 @@ void EnvironmentSampler::add_part(const Rotation& rotation, int part) const {
       cell_count() * static_cast<std::size_t>(part + 1) / static_cast<std::size_t>(parts_);
   for (std::size_t first = begin; first < end; first += kBatch) {
     const auto count = static_cast<int>(std::min<std::size_t>(kBatch, end - first));
-    const float* const px = x_.data() + first;
-    const float* const py = y_.data() + first;
-    const float* const pz = z_.data() + first;
-    const float* const pw = solid_angle_.data() + first;
 
-    // Turn, find the face and the footprint: no branches, several cells an instruction.
-    for (int i = 0; i < count; ++i) {
-      const float x = turn.m[0] * px[i] + turn.m[1] * py[i] + turn.m[2] * pz[i];
-      const float y = turn.m[3] * px[i] + turn.m[4] * py[i] + turn.m[5] * pz[i];
-      const float z = turn.m[6] * px[i] + turn.m[7] * py[i] + turn.m[8] * pz[i];
-      const float ax = std::abs(x), ay = std::abs(y), az = std::abs(z);
-      const bool on_x = (ax >= ay) & (ax >= az);
-      const bool on_y = !on_x & (ay >= az);
-      // The face's rows of cubemap.h: the axis, and what runs along u and v on its positive side.
-      const float axis = on_x ? x : on_y ? y : z;
-      const float along_u = on_x ? -z : x;
-      const float along_v = on_y ? z : -y;
-      const bool negative = axis < 0;
-      const float scale = 1 / std::abs(axis);
-      // On the negative side u turns around, except about Y, where v does.
-      const float u = (negative & !on_y ? -along_u : along_u) * scale;
-      const float v = (negative & on_y ? -along_v : along_v) * scale;
-      const int face = (on_x ? 0 : on_y ? 2 : 4) + (negative ? 1 : 0);
-
-      const float s = 1 + u * u + v * v;
-      const float half_x = half_footprint(pw[i], s, u, half_n);
-      const float half_y = half_footprint(pw[i], s, v, half_n);
-      const float middle_x = (u + 1) * half_n, middle_y = (v + 1) * half_n;
-      const float low_x = middle_x - half_x, high_x = middle_x + half_x;
-      const float low_y = middle_y - half_y, high_y = middle_y + half_y;
-      const int x0 = static_cast<int>(low_x), y0 = static_cast<int>(low_y);
-      const float over_x = (high_x - static_cast<float>(x0 + 1)) / (2 * half_x);
-      const float over_y = (high_y - static_cast<float>(y0 + 1)) / (2 * half_y);
-      const auto at = static_cast<std::size_t>(i);
-      prints.texel[at] = face * face_texels + y0 * n_ + x0;
-      prints.share_x[at] = over_x > 0 ? over_x : 0;
-      prints.share_y[at] = over_y > 0 ? over_y : 0;
-      prints.crosses_edge[at] =
-          (low_x < 0) | (high_x >= size) | (low_y < 0) | (high_y >= size) ? 1 : 0;
-    }
-
+    place(turn, x_.data() + first, y_.data() + first, z_.data() + first, width_.data() + first,
+          count, n_, prints);
     for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
       const std::size_t cell = first + i;
       if (prints.crosses_edge[i]) {
@@ -211,38 +216,70 @@ void EnvironmentSampler::add_part(const Rotation& rotation, int part) const {
       }
       const auto texel = static_cast<std::size_t>(prints.texel[i]);
       const float right = prints.share_x[i], below = prints.share_y[i];
-      add(cell, texel, (1 - right) * (1 - below));
-      if (right > 0) add(cell, texel + 1, right * (1 - below));
-      if (below > 0) {
-        add(cell, texel + n, (1 - right) * below);
-        if (right > 0) add(cell, texel + n + 1, right * below);
-      }
+      const Sums here = light_[cell];
+      const Sums upper = (1 - below) * here, lower = below * here;
+      // Four additions cost less than guessing which are needed; a share beyond the last column or
+      // row is exactly 0.
+      sums[texel] += (1 - right) * upper;
+      sums[texel + 1] += right * upper;
+      sums[texel + n] += (1 - right) * lower;
+      sums[texel + n + 1] += right * lower;
     }
   }
 }
 
 void EnvironmentSampler::project(const Rotation& rotation, Cubemap& out) const {
-  if (out.n != n_) {
+  if (out.n != n_ || out.texels.size() != 6 * texel_solid_angle_.size()) {
     throw Error(ErrorKind::invalid_argument,
                 fmt::format("cube map has faces of {}, expected {}", out.n, n_));
   }
   parallel_for(parts_, [&](int part) { add_part(rotation, part); });
 
-  const std::size_t texels = out.texels.size();
-  const auto strips = static_cast<int>((texels + kStripTexels - 1) / kStripTexels);
-  parallel_for(strips, [&](int strip) {
-    const std::size_t first = static_cast<std::size_t>(strip) * kStripTexels;
-    const std::size_t last = std::min(first + kStripTexels, texels);
-    for (std::size_t texel = first; texel < last; ++texel) {
-      TexelSum sum = scratch_[texel];
+  // All parts together, in a fixed order: into the first part's place. The mean radiance of what
+  // arrived, energy / solid angle, goes where the second part was.
+  const auto n = static_cast<std::size_t>(n_);
+  Sums* const sums = scratch_.data();
+  Sums* const means = scratch_.data() + part_stride();
+  const int rows_at_once = std::max(1, kTexelsAtOnce / n_);
+  const auto sum_parts = [&](int row) {
+    const std::size_t first = static_cast<std::size_t>(row) * n;
+    for (std::size_t texel = first; texel < first + n; ++texel) {
+      Sums sum = sums[texel];
       for (std::size_t part = 1; part < static_cast<std::size_t>(parts_); ++part) {
-        for (int i = 0; i < 4; ++i) sum.part[i] += scratch_[part * texels + texel].part[i];
+        sum += scratch_[part * part_stride() + texel];
       }
+      sums[texel] = sum;
       // Cells tile the sphere and are smaller than a texel, so something arrived everywhere.
-      const float scale = 1 / sum.part[3];
-      out.texels[texel] = {sum.part[0] * scale, sum.part[1] * scale, sum.part[2] * scale};
+      means[texel] = sum * (1 / sum[3]);
     }
-  });
+  };
+  parallel_for(6 * n_, sum_parts, rows_at_once);
+
+  // The solid angle that arrived is uneven by up to some per cent, as cells are few and lie at all
+  // angles. Divided by it, a smooth sky stays smooth, but a light in one texel loses or gains
+  // energy; divided by the exact solid angle it is the other way round. So the least mean c of the
+  // 3 x 3 texels around, which a light has above it, is taken as smooth and the rest as light:
+  //   radiance = c + (energy - c * arrived) / exact
+  const auto finish_row = [&](int row) {
+    const int face = row / n_, y = row % n_;
+    for (int x = 0; x < n_; ++x) {
+      const std::size_t texel = cube_index(face, x, y, n_);
+      Sums least = means[texel];
+      for (int ny = std::max(y - 1, 0); ny <= std::min(y + 1, n_ - 1); ++ny) {
+        for (int nx = std::max(x - 1, 0); nx <= std::min(x + 1, n_ - 1); ++nx) {
+          const Sums other = means[cube_index(face, nx, ny, n_)];
+          least = other < least ? other : least;
+        }
+      }
+      const Sums sum = sums[texel];
+      const float exact = texel_solid_angle_[texel % (n * n)];
+      const Sums radiance = least + (sum - least * sum[3]) * (1 / exact);
+      // Rounding alone could leave a hair below nothing.
+      out.texels[texel] = {std::max(radiance[0], 0.0f), std::max(radiance[1], 0.0f),
+                           std::max(radiance[2], 0.0f)};
+    }
+  };
+  parallel_for(6 * n_, finish_row, rows_at_once);
 }
 
 Cubemap environment_to_cubemap(const Environment& environment, int face_size,
