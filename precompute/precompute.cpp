@@ -64,6 +64,11 @@ void check_output(const std::filesystem::path& file) {
   }
 }
 
+bool is_padding(std::span<const std::uint32_t> outputs) {
+  return std::all_of(outputs.begin(), outputs.end(),
+                     [](std::uint32_t o) { return o == kNoOutput; });
+}
+
 // Scratch memory handed from tile to tile, at most one a thread.
 struct Work {
   TileTracer::Scratch scratch;
@@ -257,8 +262,12 @@ PrecomputeReport precompute_image(const Scene& scene, const Camera& camera,
   const std::vector<std::uint32_t> order = image_row_order(camera.width, camera.height);
   PrecomputeReport report;
 
+  for (std::size_t row = 0; row < order.size(); row += kTileRows) {
+    if (!is_padding(std::span(order).subspan(row, kTileRows))) ++report.tiles;
+  }
+
   // Pilot tiles say how much may be dropped.
-  Steps steps(progress, static_cast<int>(order.size() / kTileRows) + kPilotTiles);
+  Steps steps(progress, report.tiles + kPilotTiles);
   report.thresholds = tune(tracer, order, camera.width, options.error, steps, report.ray_counts);
   report.pilot_seconds = seconds_since(start);
 
@@ -296,7 +305,6 @@ PrecomputeReport precompute_image(const Scene& scene, const Camera& camera,
     }
     {
       const std::lock_guard lock(mutex);
-      if (!padding) ++report.tiles;
       if (known) ++report.resumed_tiles;
       report.blocks += blocks;
       report.rgb_blocks += rgb_blocks;

@@ -1,0 +1,93 @@
+// What a camera ray meets: place, normals, colour.
+
+#include "precompute/surface.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "tests/precompute/shapes.h"
+
+namespace haarlight {
+namespace {
+
+TEST(Surface, HitsLieOnTheSphereFacingTheViewer) {
+  Scene scene = shapes::empty_scene();
+  shapes::add_sphere(scene, {0, 0, 0}, 1, 5);  // local radius 1, too
+  const Visibility visibility(scene);
+  std::mt19937 random(7);
+  for (int i = 0; i < 1000; ++i) {
+    const Vec3 from = 3 * shapes::random_direction(random);
+    const Vec3 to = 0.9 * shapes::random_direction(random);
+    const auto hit = surface_hit(scene, visibility, from, normalize(to - from));
+    ASSERT_TRUE(hit);
+    // Edges are at most sqrt(2) / 2^5 on the octahedron, sqrt(3) times that on the sphere; the
+    // middle of a face is edge^2 / 6 below it.
+    EXPECT_NEAR(length(hit->position), 1, 1e-3);
+    EXPECT_GT(dot(hit->geometric_normal, from - hit->position), 0);
+    // Smooth normals differ from the place's direction by the square of half an edge.
+    EXPECT_GT(dot(hit->normal, normalize(hit->position)), 1 - 1e-3);
+    EXPECT_NEAR(length(hit->position - from), hit->distance, 1e-5);
+    EXPECT_NEAR(length(hit->normal), 1, 1e-12);
+  }
+}
+
+TEST(Surface, MirrorDirectionObeysTheLawOfReflection) {
+  Scene scene = shapes::empty_scene();
+  scene.material[0].specular = {0.5f, 0.5f, 0.5f};
+  shapes::add_quad(scene, {-1, 0, -1}, {0, 0, 2}, {2, 0, 0});
+  const Visibility visibility(scene);
+  const Vec3 towards = normalize(Vec3{0.3, -0.8, 0.1});
+  const auto hit = surface_hit(scene, visibility, visibility.to_local({-0.3, 0.8, -0.1}), towards);
+  ASSERT_TRUE(hit);
+  const ShadingPoint point = shading_point(scene, *hit);
+  EXPECT_TRUE(point.glossy);
+  EXPECT_NEAR(length(point.mirror - Vec3{towards.x, -towards.y, towards.z}), 0, 1e-12);
+  EXPECT_GT(point.origin[1], 0.0f);  // off the surface, on the viewer's side
+}
+
+TEST(Surface, BackSidesAreLitFromTheViewersSide) {
+  Scene scene = shapes::empty_scene();
+  shapes::add_quad(scene, {-1, 0, -1}, {0, 0, 2}, {2, 0, 0});  // faces up
+  const Visibility visibility(scene);
+  const auto below = surface_hit(scene, visibility, {0.1, -1, 0.2}, {0, 1, 0});
+  ASSERT_TRUE(below);
+  EXPECT_EQ(below->geometric_normal, (Vec3{0, -1, 0}));
+  EXPECT_EQ(below->normal, (Vec3{0, -1, 0}));
+  EXPECT_FALSE(surface_hit(scene, visibility, {0.1, -1, 0.2}, {0, -1, 0}));
+}
+
+TEST(Surface, TextureIsBilinearRepeatsAndStartsAtTheLowerLeft) {
+  Image image(2, 2);
+  image.at(0, 0) = {1, 0, 0};  // top left
+  image.at(1, 0) = {0, 1, 0};
+  image.at(0, 1) = {0, 0, 1};  // bottom left
+  image.at(1, 1) = {1, 1, 1};
+  EXPECT_EQ(sample_texture(image, 0.25, 0.75), (Rgb{1, 0, 0}));
+  EXPECT_EQ(sample_texture(image, 0.25, 0.25), (Rgb{0, 0, 1}));
+  EXPECT_EQ(sample_texture(image, 3.25, -1.25), (Rgb{1, 0, 0}));
+  EXPECT_EQ(sample_texture(image, 0.5, 0.75), (Rgb{0.5f, 0.5f, 0}));
+  EXPECT_EQ(sample_texture(image, 0, 0.5), (Rgb{0.5f, 0.5f, 0.5f}));  // across the border
+  EXPECT_TRUE(is_finite(sample_texture(image, std::nan(""), INFINITY)));
+  EXPECT_TRUE(is_finite(sample_texture(image, 1e30, -1e30)));
+}
+
+TEST(Surface, AlbedoIsMaterialTimesTextureTimesTint) {
+  Scene scene = shapes::empty_scene();
+  shapes::add_quad(scene, {-1, 0, -1}, {0, 0, 2}, {2, 0, 0});
+  scene.material[0].albedo = {0.5f, 0.5f, 0.25f};
+  scene.material[0].texture = 0;
+  scene.texture.emplace_back(1, 1);
+  scene.texture[0].pixels[0] = {0.5f, 1, 1};
+  scene.tint.assign(4, Rgb{1, 0.5f, 1});
+  const Visibility visibility(scene);
+  const auto hit = surface_hit(scene, visibility, {0.1, 1, 0.2}, {0, -1, 0});
+  ASSERT_TRUE(hit);
+  EXPECT_NEAR(hit->albedo.r, 0.25f, 1e-6f);
+  EXPECT_NEAR(hit->albedo.g, 0.25f, 1e-6f);
+  EXPECT_NEAR(hit->albedo.b, 0.25f, 1e-6f);
+}
+
+}  // namespace
+}  // namespace haarlight

@@ -1,0 +1,13 @@
+haarlight_test(precompute/default_stage haarlight_precompute)
+haarlight_test(precompute/direction_table haarlight_precompute)
+haarlight_test(precompute/phong_lobe haarlight_precompute)
+haarlight_test(precompute/point_tracer haarlight_precompute)
+haarlight_test(precompute/polygon haarlight_precompute)
+haarlight_test(precompute/precompute haarlight_precompute)
+haarlight_test(precompute/scene_clean haarlight_precompute)
+haarlight_test(precompute/scene_import haarlight_precompute)
+haarlight_test(precompute/surface haarlight_precompute)
+haarlight_test(precompute/tile_tracer haarlight_precompute)
+haarlight_test(precompute/visibility haarlight_precompute)
+target_compile_definitions(test_precompute_scene_import PRIVATE
+  HAARLIGHT_SOURCE_DIR="${PROJECT_SOURCE_DIR}")

@@ -1,0 +1,159 @@
+// Embree against brute force; no self-shadowing; no leaks; no dependence on scale.
+
+#include "precompute/visibility.h"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <random>
+
+#include "core/error.h"
+#include "tests/precompute/shapes.h"
+#include "tests/reference/ray_triangle.h"
+
+namespace haarlight {
+namespace {
+
+struct Packet {
+  alignas(32) float x[8], y[8], z[8];
+  Packet(std::mt19937& random) {
+    for (int i = 0; i < 8; ++i) set(i, shapes::random_direction(random));
+  }
+  void set(int i, const Vec3& d) {
+    x[i] = static_cast<float>(d.x), y[i] = static_cast<float>(d.y), z[i] = static_cast<float>(d.z);
+  }
+  Vec3 get(int i) const {
+    return {static_cast<double>(x[i]), static_cast<double>(y[i]), static_cast<double>(z[i])};
+  }
+};
+
+std::array<float, 3> to_float(const Vec3& v) {
+  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
+}
+Vec3 to_vec(const std::array<float, 3>& v) {
+  return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
+}
+
+TEST(Visibility, AgreesWithBruteForce) {
+  std::mt19937 random(1);
+  Scene scene = shapes::empty_scene();
+  shapes::add_random_triangles(scene, 150, 0.5, random);
+  const Visibility visibility(scene);
+  std::uniform_real_distribution<double> place(-1, 1);
+  int blocked = 0, compared = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const auto origin = to_float({place(random), place(random), place(random)});
+    const Packet packet(random);
+    const unsigned lanes = static_cast<unsigned>(random()) & 0xffu;
+    const unsigned result = visibility.occluded8(origin, packet.x, packet.y, packet.z, lanes);
+    EXPECT_EQ(result & ~lanes, 0u);
+    for (int lane = 0; lane < 8; ++lane) {
+      const auto expected = reference::trace(visibility, to_vec(origin), packet.get(lane));
+      if (!(lanes >> lane & 1u) || expected.margin < 1e-5) continue;
+      ++compared;
+      blocked += expected.blocked;
+      EXPECT_EQ((result >> lane & 1u) != 0, expected.blocked) << "ray " << i << " lane " << lane;
+      const auto hit = visibility.first_hit(to_vec(origin), packet.get(lane));
+      ASSERT_EQ(hit.has_value(), expected.blocked);
+      // Distances up to 4 in float, slant up to 1 / 1e-5 excluded by the margin being mild here.
+      if (hit) {
+        EXPECT_NEAR(hit->distance, expected.nearest, 1e-4);
+      }
+    }
+  }
+  EXPECT_GT(compared, 7000);  // half of 16,000 lanes, few of them near a border
+  EXPECT_GT(blocked, compared / 5);
+  EXPECT_LT(blocked, compared * 4 / 5);
+}
+
+// Rays that leave a convex body never meet it again: 0 in a million, near and far from the origin,
+// with triangles of all sizes.
+TEST(Visibility, ConvexBodiesDoNotShadowThemselves) {
+  Scene sphere = shapes::empty_scene();
+  shapes::add_sphere(sphere, {0.1, 0.2, 0.3}, 0.7, 6);
+  Scene needle = shapes::empty_scene();
+  shapes::add_box(needle, {0, 0, 0}, {1, 1e-3, 3e-3});
+  std::mt19937 random(2);
+  for (const Scene& scene : {sphere, shapes::moved(sphere, 1, {3e5, -1e5, 2e5}),
+                             shapes::moved(sphere, 1e-4, {}), needle}) {
+    const Visibility visibility(scene);
+    std::uniform_real_distribution<double> unit(0, 1);
+    std::int64_t rays = 0, blocked = 0;
+    while (rays < 250000) {
+      const auto t = static_cast<std::uint32_t>(random() % visibility.triangle_count());
+      double b1 = unit(random), b2 = unit(random);
+      if (b1 + b2 > 1) b1 = 1 - b1, b2 = 1 - b2;
+      const Vec3 a = visibility.corner(t, 0), b = visibility.corner(t, 1),
+                 c = visibility.corner(t, 2);
+      const Vec3 normal = normalize(cross(b - a, c - a));
+      const auto origin =
+          to_float(a * (1 - b1 - b2) + b * b1 + c * b2 + Visibility::kSurfaceOffset * normal);
+      Packet packet(random);
+      for (int lane = 0; lane < 8; ++lane) {
+        Vec3 d = packet.get(lane);
+        if (dot(d, normal) < 0) d = -d;
+        if (lane % 2 == 0) d = normalize(d - 0.999 * dot(d, normal) * normal);  // grazing
+        packet.set(lane, d);
+      }
+      blocked += std::popcount(visibility.occluded8(origin, packet.x, packet.y, packet.z, 0xff));
+      rays += 8;
+    }
+    EXPECT_EQ(blocked, 0) << rays << " rays";
+  }
+}
+
+// From inside a closed body every ray is blocked. Random rays hit an edge exactly with probability
+// of about 1e-7 each, so none of 400,000 is expected to slip through, and none is allowed.
+TEST(Visibility, ClosedBodiesDoNotLeak) {
+  Scene scene = shapes::empty_scene();
+  shapes::add_sphere(scene, {}, 1, 5);
+  std::mt19937 random(3);
+  for (const Vec3& by : {Vec3{}, Vec3{148376, -148376, 98000}}) {
+    const Scene there = shapes::moved(scene, 1, by);
+    const Visibility visibility(there);
+    std::uniform_real_distribution<double> place(-0.5, 0.5);
+    for (int i = 0; i < 25000; ++i) {
+      const Packet packet(random);
+      const auto origin = to_float({place(random), place(random), place(random)});
+      ASSERT_EQ(visibility.occluded8(origin, packet.x, packet.y, packet.z, 0xff), 0xffu);
+    }
+  }
+}
+
+TEST(Visibility, LocalFrameIgnoresPowerOfTwoScale) {
+  std::mt19937 random(4);
+  Scene scene = shapes::empty_scene();
+  shapes::add_random_triangles(scene, 20, 0.7, random);
+  const Visibility plain(scene);
+  for (const int exponent : {-40, -20, 20, 40}) {
+    const double scale = std::ldexp(1.0, exponent);
+    const Visibility scaled(shapes::moved(scene, scale, {}));
+    for (std::uint32_t t = 0; t < plain.triangle_count(); ++t) {
+      for (int c = 0; c < 3; ++c) EXPECT_EQ(plain.corner(t, c), scaled.corner(t, c));
+    }
+    const Vec3 p{0.3, -0.7, 1.9};
+    EXPECT_EQ(plain.to_local(p), scaled.to_local(scale * p));
+  }
+}
+
+TEST(Visibility, RefusesScenesWithoutTrianglesOrExtent) {
+  Scene scene = shapes::empty_scene();
+  try {
+    const Visibility visibility(scene);
+    FAIL() << "expected an error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::missing);
+  }
+  shapes::add_vertex(scene, {1, 1, 1}, {0, 1, 0});
+  scene.triangle.push_back({{0, 0, 0}, 0});
+  try {
+    const Visibility visibility(scene);
+    FAIL() << "expected an error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::format);
+  }
+}
+
+}  // namespace
+}  // namespace haarlight
