@@ -1,0 +1,82 @@
+// haarlight-bench: kernels and whole frames, measured against what the machine can do.
+
+#include <benchmark/benchmark.h>
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "bench/inputs.h"
+#include "bench/summary.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "precompute/scene_import.h"
+#include "prt/apply_kernel.h"
+#include "prt/motion.h"
+
+namespace haarlight::bench {
+
+Inputs& inputs() {
+  static Inputs all;
+  return all;
+}
+
+namespace {
+
+int run(const std::string& transport, const std::string& environment, const std::string& scene) {
+  Inputs& in = inputs();
+  in.transport = Transport::open(transport);
+  const Environment light = load_environment(environment);
+  Motion motion({}, in.transport->layout(), light);
+  for (int frame = 0; frame < 100; ++frame) {
+    const auto target = motion.coefficients(frame);
+    in.targets.emplace_back(target.begin(), target.end());
+  }
+  if (!scene.empty()) in.scene = import_scene(scene);
+
+  fmt::print("transport {}: {}x{}, {:.1f} MiB of columns; {} threads; {} kernel\n", transport,
+             in.transport->width(), in.transport->height(),
+             static_cast<double>(in.transport->chunk_bytes()) / 1048576, thread_count(),
+             apply_kernel_name());
+  register_memory();
+  register_decide();
+  register_relight();
+  if (in.scene) register_rays();
+  Collector collector;
+  benchmark::RunSpecifiedBenchmarks(&collector);
+  collector.print_summary();
+  return 0;
+}
+
+}  // namespace
+}  // namespace haarlight::bench
+
+int main(int argc, char** argv) {
+  // Seven repetitions and their median, unless the command line says otherwise (it comes later).
+  std::vector<std::string> defaults{argv[0], "--benchmark_repetitions=7",
+                                    "--benchmark_report_aggregates_only=true",
+                                    "--benchmark_min_time=0.2"};
+  std::vector<char*> arguments;
+  for (std::string& text : defaults) arguments.push_back(text.data());
+  for (int i = 1; i < argc; ++i) arguments.push_back(argv[i]);
+  int count = static_cast<int>(arguments.size());
+  benchmark::Initialize(&count, arguments.data());
+
+  CLI::App app{
+      "Measures relighting and ray tracing, and prints ratios to the machine's own limits.\n"
+      "All --benchmark_* flags of Google Benchmark work; --benchmark_filter=REGEX picks cases:\n"
+      "memory.read, decide.*, apply.*, frame.*, rays.*"};
+  std::string transport, environment, scene;
+  app.add_option("--transport", transport, "transport file (.hlt)")->required();
+  app.add_option("--env", environment, "environment, turned by `rotate`")->required();
+  app.add_option("--scene", scene, "scene for the ray cases; without it they are left out");
+  CLI11_PARSE(app, count, arguments.data());
+  try {
+    return haarlight::bench::run(transport, environment, scene);
+  } catch (const haarlight::Error& error) {
+    fmt::print(stderr, "haarlight-bench: {}\n", error.what());
+    return 1;
+  }
+}

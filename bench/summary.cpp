@@ -1,0 +1,79 @@
+// Ratios between cases.
+
+#include "bench/summary.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace haarlight::bench {
+
+void Collector::ReportRuns(const std::vector<Run>& runs) {
+  ConsoleReporter::ReportRuns(runs);
+  for (const Run& run : runs) {
+    if (run.error_occurred || run.aggregate_name != "median") continue;
+    Case& entry = median_[run.run_name.function_name];
+    entry.milliseconds = run.GetAdjustedRealTime();  // every case reports milliseconds
+    for (const auto& [name, counter] : run.counters) entry.counters[name] = counter.value;
+  }
+}
+
+void Collector::print_summary() const {
+  const auto find = [&](const std::string& name) -> const Case* {
+    const auto it = median_.find(name);
+    return it == median_.end() ? nullptr : &it->second;
+  };
+  fmt::print("\nRatios (medians of this run)\n");
+  const Case* read = find("memory.read");
+  for (const char* name : {"apply.bi.k30", "apply.pbi.k30", "apply.nwa.k30", "apply.reference"}) {
+    const Case* apply = find(name);
+    if (!apply || !read) continue;
+    const double share =
+        apply->counters.at("bytes_per_second") / read->counters.at("bytes_per_second");
+    const double transport =
+        apply->counters.at("transport_bytes_per_second") / read->counters.at("bytes_per_second");
+    fmt::print(
+        "  {:<18} {:5.1f} GB/s, {:.0f} % of the read bandwidth of {:.1f} GB/s "
+        "(transport alone {:.0f} %)\n",
+        name, apply->counters.at("bytes_per_second") / 1e9, 100 * share,
+        read->counters.at("bytes_per_second") / 1e9, 100 * transport);
+  }
+  const Case* pbi = find("frame.pbi.k30");
+  const Case* nwa = find("frame.nwa.k30");
+  if (pbi && nwa) {
+    fmt::print("  PBI frame / NWA frame at 30 wavelets: {:.3f} / {:.3f} ms = {:.2f}\n",
+               pbi->counters.at("ms_per_frame"), nwa->counters.at("ms_per_frame"),
+               pbi->counters.at("ms_per_frame") / nwa->counters.at("ms_per_frame"));
+    fmt::print("  PBI beside the transport: {:.1f} MiB, {:.1f} % of it\n",
+               pbi->counters.at("extra_bytes") / 1048576,
+               100 * pbi->counters.at("extra_bytes") / pbi->counters.at("transport_file_bytes"));
+    fmt::print("  at equal milliseconds, mean lighting error while moving:\n");
+    for (const auto& [name, entry] : median_) {
+      if (name.rfind("frame.", 0) != 0) continue;
+      fmt::print("    {:<16} {:7.3f} ms  error {:.3f}\n", name, entry.counters.at("ms_per_frame"),
+                 entry.counters.at("lighting_error"));
+    }
+  }
+  for (const char* name : {"decide.nwa.k30", "decide.bi.k30", "decide.pbi.k30"}) {
+    if (const Case* decide = find(name)) {
+      fmt::print("  {:<18} {:.3f} ms\n", name, decide->counters.at("ms_per_frame"));
+    }
+  }
+  const Case* tracer = find("rays.tracer");
+  const Case* packets = find("rays.bare.packets");
+  const Case* stream = find("rays.bare.stream");
+  if (tracer && packets) {
+    const double mine = tracer->counters.at("items_per_second");
+    const double bare = packets->counters.at("items_per_second");
+    fmt::print("  visibility rays: {:.1f} M/s, {:.0f} % of bare packets at {:.1f} M/s", mine / 1e6,
+               100 * mine / bare, bare / 1e6);
+    if (stream) {
+      fmt::print(", {:.0f} % of a bare stream at {:.1f} M/s",
+                 100 * mine / stream->counters.at("items_per_second"),
+                 stream->counters.at("items_per_second") / 1e6);
+    }
+    fmt::print("\n");
+  }
+}
+
+}  // namespace haarlight::bench
