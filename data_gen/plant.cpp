@@ -247,7 +247,7 @@ Scene make_plant(std::uint64_t seed) {
     builder.add_ellipsoid(pebble, place + kUp * (size * 0.55),
                           {size * stones.between(0.9, 1.3), size * 0.62, size}, 24);
   }
-  return builder.finish(look_at({0.75, 1.12, 3.15}, {0.02, 0.50, 0}, 0.56, 512, 512));
+  return builder.finish(look_at({0.56, 1.08, 2.72}, {-0.10, 0.49, 0}, 0.56, 512, 512));
 }
 
 }  // namespace haarlight::data_gen
