@@ -67,8 +67,7 @@ void keep_energy(std::span<EnvironmentCell> pieces_of_pixel, const Rgb& radiance
 class LatlongCutter {
  public:
   LatlongCutter(const Environment& environment, double width)
-      : environment_(environment),
-        picture_(environment.picture()),
+      : picture_(environment.picture()),
         width_(width),
         pixel_height_(kPi / picture_.height),
         pixel_width_(2 * kPi / picture_.width) {}
@@ -76,7 +75,7 @@ class LatlongCutter {
   void run(const BlockSink& sink) {
     const int split = pieces(pixel_height_, width_);
     if (split > 1) {
-      for (int y = 0; y < picture_.height; ++y) split_row(y, split, sink);
+      for (const Strip& strip : balanced_strips(split)) cut_strip(strip, sink);
       return;
     }
     const int merged = pieces(width_, pixel_height_);
@@ -98,44 +97,65 @@ class LatlongCutter {
     return cell;
   }
 
-  /// One row of pixels higher than a cell: `strips` strips of it. In each strip, pixels are cut
-  /// further, or merged with their neighbours near the poles.
-  void split_row(int y, int strips, const BlockSink& sink) {
-    const auto width = static_cast<std::size_t>(picture_.width);
-    std::vector<std::vector<EnvironmentCell>> strip_pieces(static_cast<std::size_t>(strips));
-    std::vector<std::size_t> cuts(static_cast<std::size_t>(strips));
-    for (std::size_t j = 0; j < cuts.size(); ++j) {
-      const double top = (y + static_cast<double>(j) / strips) * pixel_height_;
-      const double bottom = (y + static_cast<double>(j + 1) / strips) * pixel_height_;
-      cuts[j] =
-          static_cast<std::size_t>(pieces(pixel_width_ * std::sin(0.5 * (top + bottom)), width_));
-      const double step = pixel_width_ / static_cast<double>(cuts[j]);
-      for (std::size_t i = 0; i < width * cuts[j]; ++i) {
-        EnvironmentCell cell =
-            piece(static_cast<double>(i) * step, static_cast<double>(i + 1) * step, top, bottom);
-        // Looked up at the middle in the picture, so that equal pixels give equal pieces.
-        cell.energy = RgbD(lookup((static_cast<double>(i) + 0.5) / static_cast<double>(cuts[j]),
-                                  (y + (static_cast<double>(j) + 0.5) / strips))) *
-                      cell.solid_angle;
-        strip_pieces[j].push_back(cell);
-      }
+  /// A strip of a pixel row, and how it blends the rows whose middles lie around it.
+  struct Strip {
+    double top, bottom;  // polar angles
+    int low, high;       // rows; the same one beyond the last middle
+    double share_high;
+  };
+
+  /// The strips of all rows, `split` to a row. Bilinear by position alone would give the rows at
+  /// the poles up to 8 % too much of the sphere. So the blend is balanced: shares of a strip still
+  /// sum to 1, which keeps a constant constant, and each row gets its own solid angle in all, which
+  /// keeps its energy. Scaling rows and strips in turn finds that (Sinkhorn 1967).
+  std::vector<Strip> balanced_strips(int split) const {
+    const int rows = picture_.height;
+    std::vector<Strip> strips;
+    std::vector<double> solid_angle, row_wanted(static_cast<std::size_t>(rows));
+    for (int j = 0; j < rows * split; ++j) {
+      const double position = (j + 0.5) / split - 0.5;  // in rows, 0 at the first middle
+      const int low = static_cast<int>(std::floor(position));
+      Strip strip{j * pixel_height_ / split, (j + 1) * pixel_height_ / split, std::max(low, 0),
+                  std::min(low + 1, rows - 1), position - low};
+      solid_angle.push_back(std::cos(strip.top) - std::cos(strip.bottom));
+      row_wanted[static_cast<std::size_t>(j / split)] += solid_angle.back();
+      strips.push_back(strip);
     }
-    // Each pixel's energy, over the strips it is spread on.
-    std::vector<EnvironmentCell> pixel;
-    for (std::size_t x = 0; x < width; ++x) {
-      pixel.clear();
-      for (std::size_t j = 0; j < cuts.size(); ++j) {
-        for (std::size_t i = 0; i < cuts[j]; ++i) {
-          pixel.push_back(strip_pieces[j][x * cuts[j] + i]);
-        }
+    // The rows away from the poles are balanced from the start; those near settle by half a step.
+    constexpr int kRounds = 40;
+    std::vector<double> row_scale(row_wanted.size(), 1.0), row_got;
+    const std::vector<Strip> by_position = strips;
+    for (int round = 0; round < kRounds; ++round) {
+      row_got.assign(row_wanted.size(), 0.0);
+      for (std::size_t j = 0; j < strips.size(); ++j) {
+        Strip& strip = strips[j];
+        const auto low = static_cast<std::size_t>(strip.low);
+        const auto high = static_cast<std::size_t>(strip.high);
+        const double share = by_position[j].share_high;
+        const double a = (1 - share) * row_scale[low], b = share * row_scale[high];
+        strip.share_high = b / (a + b);
+        row_got[low] += (1 - strip.share_high) * solid_angle[j];
+        row_got[high] += strip.share_high * solid_angle[j];
       }
-      keep_energy(pixel, picture_.at(static_cast<int>(x), y));
-      std::size_t next = 0;
-      for (std::size_t j = 0; j < cuts.size(); ++j) {
-        for (std::size_t i = 0; i < cuts[j]; ++i) strip_pieces[j][x * cuts[j] + i] = pixel[next++];
-      }
+      for (std::size_t r = 0; r < row_scale.size(); ++r) row_scale[r] *= row_wanted[r] / row_got[r];
     }
-    for (const std::vector<EnvironmentCell>& strip : strip_pieces) emit_strip({&strip, 1}, sink);
+    return strips;
+  }
+
+  /// One strip of a row of pixels higher than a cell. Pixels are cut in x too, or merged with their
+  /// neighbours near the poles.
+  void cut_strip(const Strip& strip, const BlockSink& sink) {
+    const int cuts = pieces(pixel_width_ * std::sin(0.5 * (strip.top + strip.bottom)), width_);
+    const double step = pixel_width_ / cuts;
+    std::vector<EnvironmentCell> row;
+    for (int i = 0; i < picture_.width * cuts; ++i) {
+      EnvironmentCell cell = piece(i * step, (i + 1) * step, strip.top, strip.bottom);
+      cell.energy = ((1 - strip.share_high) * lookup((i + 0.5) / cuts, strip.low) +
+                     strip.share_high * lookup((i + 0.5) / cuts, strip.high)) *
+                    cell.solid_angle;
+      row.push_back(cell);
+    }
+    emit_strip({&row, 1}, sink);
   }
 
   /// Several whole rows of pixels, together as high as a cell.
@@ -172,19 +192,14 @@ class LatlongCutter {
     }
   }
 
-  /// Bilinear at (x, y) in pixels, wrapped around in x and clamped in y.
-  Rgb lookup(double x, double y) const {
-    const double fx = std::floor(x - 0.5), fy = std::floor(y - 0.5);
-    const auto sx = static_cast<float>(x - 0.5 - fx), sy = static_cast<float>(y - 0.5 - fy);
-    const int w = picture_.width, h = picture_.height;
-    const int x0 = (static_cast<int>(fx) + w) % w, x1 = (static_cast<int>(fx) + 1) % w;
-    const int y0 = std::max(static_cast<int>(fy), 0);
-    const int y1 = std::min(static_cast<int>(fy) + 1, h - 1);
-    return (1 - sy) * ((1 - sx) * picture_.at(x0, y0) + sx * picture_.at(x1, y0)) +
-           sy * ((1 - sx) * picture_.at(x0, y1) + sx * picture_.at(x1, y1));
+  /// Linear between the pixels of row y, around the circle; x in pixels.
+  RgbD lookup(double x, int y) const {
+    const double floor = std::floor(x - 0.5), share = x - 0.5 - floor;
+    const int w = picture_.width, x0 = static_cast<int>(floor);
+    return (1 - share) * RgbD(picture_.at((x0 + w) % w, y)) +
+           share * RgbD(picture_.at((x0 + 1) % w, y));
   }
 
-  const Environment& environment_;
   const Image& picture_;
   double width_, pixel_height_, pixel_width_;
 };

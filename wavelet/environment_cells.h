@@ -17,8 +17,9 @@ struct EnvironmentCell {
   double solid_angle = 0;  ///< sr
 };
 
-/// Cells of about `solid_angle` sr that tile the sphere. A pixel bigger than that is cut in k x k,
-/// bilinear between pixel centres and scaled so that the pixel's energy stays; smaller pixels are
+/// Cells of about `solid_angle` sr that tile the sphere. A pixel bigger than that is cut; radiance
+/// is bilinear between pixel centres, balanced so that each pixel's energy stays (lat-long: by the
+/// shares of the rows; angular and cross: by scaling the pieces of each pixel). Smaller pixels are
 /// merged in blocks. A block is left as single pixels if merging would displace light by more than
 /// `blur` (W m^-2 rad: energy times distance), for the worst blocks up to a quarter more cells.
 std::vector<EnvironmentCell> cut_into_cells(const Environment& environment, double solid_angle,
