@@ -70,15 +70,13 @@ PointTracer::PointTracer(const Visibility& visibility, const DirectionTable& tab
   }
 }
 
-void PointTracer::first_pass(const ShadingPoint& point, PointScratch& scratch, RayCounts& counts,
-                             const GroupFlags& free_groups) const {
+void PointTracer::first_pass(const ShadingPoint& point, PointScratch& scratch,
+                             RayCounts& counts) const {
   const FloatVec normal(point.normal), geometric(point.geometric_normal);
-  for (std::size_t i = 0; i < table_.group.size(); ++i) {
-    const DirectionTable::Group& g = table_.group[i];
+  for (const DirectionTable::Group& g : table_.group) {
     const float n_axis = normal.dot(g.x, g.y, g.z), g_axis = geometric.dot(g.x, g.y, g.z);
     if (n_axis <= -g.radius || g_axis <= -g.radius) continue;
     const bool above = n_axis > g.radius && g_axis > g.radius;
-    const bool is_free = !free_groups.empty() && free_groups[i] != 0;
     for (std::int32_t j = g.first; j < g.first + g.count; ++j) {
       const DirectionTable::Packet& p = table_.packet[static_cast<std::size_t>(j)];
       unsigned lanes = 0xff;  // first samples above both horizons
@@ -93,13 +91,8 @@ void PointTracer::first_pass(const ShadingPoint& point, PointScratch& scratch, R
         if (touched != whole) set_lanes(scratch.refine, p, touched & ~whole);
         if (lanes == 0) continue;
       }
-      unsigned blocked = 0;
-      if (is_free) {
-        counts.spared += std::popcount(lanes);
-      } else {
-        blocked = visibility_.occluded8(point.origin, p.x, p.y, p.z, lanes);
-        counts.shadow += std::popcount(lanes);
-      }
+      const unsigned blocked = visibility_.occluded8(point.origin, p.x, p.y, p.z, lanes);
+      counts.shadow += std::popcount(lanes);
       set_lanes(scratch.known, p, lanes);
       set_lanes(scratch.visible, p, lanes & ~blocked);
     }
@@ -186,8 +179,7 @@ void PointTracer::refine(const ShadingPoint& point, const PhongLobe* phong,
 }
 
 void PointTracer::trace(const ShadingPoint& point, std::span<float> lambert, std::span<float> lobe,
-                        PointScratch& scratch, RayCounts& counts,
-                        const GroupFlags& free_groups) const {
+                        PointScratch& scratch, RayCounts& counts) const {
   const std::size_t words = (table_.texels() + 63) / 64;
   scratch.known.assign(words, 0);
   scratch.visible.assign(words, 0);
@@ -197,7 +189,7 @@ void PointTracer::trace(const ShadingPoint& point, std::span<float> lambert, std
   if (point.glossy) std::fill(lobe.begin(), lobe.end(), 0.0f);
   ++counts.points;
 
-  first_pass(point, scratch, counts, free_groups);
+  first_pass(point, scratch, counts);
   if (adaptive_) {
     if (table_.samples > 1) mark_differences(scratch);
   } else {

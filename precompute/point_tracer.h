@@ -29,10 +29,9 @@ struct ShadingPoint {
 struct RayCounts {
   std::int64_t primary = 0;  ///< from the camera
   std::int64_t shadow = 0;   ///< traced towards the light
-  std::int64_t spared = 0;   ///< towards the light, known free without tracing
   std::int64_t points = 0;   ///< shading points
   RayCounts& operator+=(const RayCounts& o) {
-    primary += o.primary, shadow += o.shadow, spared += o.spared, points += o.points;
+    primary += o.primary, shadow += o.shadow, points += o.points;
     return *this;
   }
 };
@@ -42,9 +41,6 @@ struct PointScratch {
   std::vector<std::uint64_t> known, visible, refine;  // a bit a texel
   std::vector<float> lobe_weights;
 };
-
-/// Sees what groups of directions (DirectionTable::group) are free of any triangle.
-using GroupFlags = std::vector<std::uint8_t>;
 
 /// Gathers light at points of one scene. Immutable, shared by all threads.
 class PointTracer {
@@ -56,17 +52,14 @@ class PointTracer {
 
   /// lambert[k] = integral over texel k of V max(0, n.w) / pi dw, and, if the point is glossy,
   /// lobe[k] = integral of V (e + 2) / (2 pi) max(0, cos alpha)^e max(0, n.w) dw; both of
-  /// table.texels() entries. V is 0 below the geometric horizon. `free_groups`, if not empty, has a
-  /// non-zero entry for each group of directions along which no ray from this point can hit
-  /// anything; they are not traced, and the result is the same bits as without it.
+  /// table.texels() entries. V is 0 below the geometric horizon.
   void trace(const ShadingPoint& point, std::span<float> lambert, std::span<float> lobe,
-             PointScratch& scratch, RayCounts& counts, const GroupFlags& free_groups = {}) const;
+             PointScratch& scratch, RayCounts& counts) const;
 
   const DirectionTable& table() const { return table_; }
 
  private:
-  void first_pass(const ShadingPoint& point, PointScratch& scratch, RayCounts& counts,
-                  const GroupFlags& free_groups) const;
+  void first_pass(const ShadingPoint& point, PointScratch& scratch, RayCounts& counts) const;
   void mark_differences(PointScratch& scratch) const;
   void refine(const ShadingPoint& point, const PhongLobe* phong, std::span<float> lambert,
               std::span<float> lobe, PointScratch& scratch, RayCounts& counts) const;

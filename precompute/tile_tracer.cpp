@@ -78,8 +78,6 @@ TileTracer::TileTracer(const Scene& scene, const Visibility& visibility, const C
       pixels_(scene, visibility, camera, options.pixel_samples),
       points_(visibility, table_, options.adaptive) {}
 
-TileTracer::~TileTracer() = default;
-
 void TileTracer::trace(std::span<const std::uint32_t> outputs, Scratch& scratch, TileRows& tile,
                        RayCounts& counts) const {
   const auto size = static_cast<std::size_t>(layout_.size());
@@ -114,8 +112,7 @@ void TileTracer::trace(std::span<const std::uint32_t> outputs, Scratch& scratch,
     const std::size_t row_channels = rgb ? 3 : 1;
     scratch.texels.assign(row_channels * size, 0.0f);
     for (const PixelPoint& p : points) {
-      points_.trace(p.point, scratch.lambert, scratch.lobe, scratch.point, counts,
-                    scratch.free_groups);
+      points_.trace(p.point, scratch.lambert, scratch.lobe, scratch.point, counts);
       for (std::size_t c = 0; c < row_channels; ++c) {
         const auto factor = [&](const RgbD& color) {
           if (!rgb) return multiple_of(color, base);

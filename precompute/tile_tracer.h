@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <vector>
 
@@ -23,7 +22,6 @@ struct TraceOptions {
   int spp = 4;            ///< directions in a texel, [1, 64]
   bool adaptive = true;   ///< all directions only where visibility changes (see PointTracer)
   int pixel_samples = 4;  ///< 1, 4 or 16
-  bool cull = true;       ///< leave out rays that provably hit nothing; never changes a bit
 };
 
 /// Throws Error{invalid_argument} naming the option, its value and what was wanted.
@@ -35,12 +33,10 @@ class TileTracer {
   /// Throws Error{invalid_argument} as check() does.
   TileTracer(const Scene& scene, const Visibility& visibility, const Camera& camera,
              const TraceOptions& options);
-  ~TileTracer();
 
   /// Working memory of one thread.
   struct Scratch {
     PointScratch point;
-    GroupFlags free_groups;
     std::vector<std::vector<PixelPoint>> pixels;
     std::vector<float> lambert, lobe, texels;
   };

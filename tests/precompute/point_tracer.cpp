@@ -208,22 +208,5 @@ TEST(PointTracer, LobeUnderOpenSkyReturnsOne) {
   }
 }
 
-TEST(PointTracer, FreeGroupsAreNotTraced) {
-  const Scene scene = free_scene();
-  const Visibility visibility(scene);
-  const DirectionTable table(32, 4);
-  const Vec3 up{0, 1, 0};
-  const ShadingPoint point = point_at(visibility, {0, 0, 0}, up, up);
-  const PointTracer tracer(visibility, table, true);
-  std::vector<float> traced(table.texels()), spared(table.texels());
-  PointScratch scratch;
-  RayCounts with, without;
-  tracer.trace(point, traced, {}, scratch, without);
-  tracer.trace(point, spared, {}, scratch, with, GroupFlags(table.group.size(), 1));
-  EXPECT_EQ(traced, spared);  // nothing is up there, so both are right
-  EXPECT_EQ(with.shadow + with.spared, without.shadow);
-  EXPECT_GT(with.spared, without.shadow / 2);
-}
-
 }  // namespace
 }  // namespace haarlight

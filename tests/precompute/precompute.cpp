@@ -151,7 +151,6 @@ TEST_F(PrecomputeImage, FingerprintSeesEverythingThatMatters) {
     last = next;
   }
   options_.resume = true;  // how, not what
-  options_.trace.cull = false;
   EXPECT_EQ(print(), last);
 }
 

@@ -143,27 +143,6 @@ TEST(TileTracer, ScaleByPowersOfTwoChangesNoBit) {
   }
 }
 
-TEST(TileTracer, CullingChangesNoBit) {
-  std::mt19937 random(8);
-  Scene soup = shapes::empty_scene();
-  shapes::add_random_triangles(soup, 300, 0.2, random);
-  for (const Scene& scene : {still_life(), soup}) {
-    TraceOptions options;
-    options.face_size = 32;
-    const Camera camera = camera_at({0.5, 1.5, 3}, {0, 0.3, 0}, 32);
-    for (std::size_t tile = 0; tile < 16; ++tile) {
-      RayCounts with, without;
-      options.cull = true;
-      const TileRows culled = rows_of(scene, camera, options, tile, &with);
-      options.cull = false;
-      const TileRows traced = rows_of(scene, camera, options, tile, &without);
-      EXPECT_TRUE(same_bits(culled.values, traced.values)) << "tile " << tile;
-      EXPECT_EQ(without.spared, 0);
-      EXPECT_EQ(with.shadow + with.spared, without.shadow);
-    }
-  }
-}
-
 TEST(TileTracer, EqualPointsGiveEqualRows) {
   // The same quad twice in the same place, and the second one the other way round.
   Scene scene = shapes::empty_scene();
