@@ -57,10 +57,14 @@ void PrecomputeCommand::run() {
     print_summary(made, report);
   } catch (const Error& error) {
     if (error.kind() != ErrorKind::cancelled) throw;
+    const std::filesystem::path journal = output.string() + ".partial";
+    if (!std::filesystem::exists(journal)) {
+      throw Error(ErrorKind::cancelled, "stopped before any part was done; nothing was written");
+    }
     throw Error(ErrorKind::cancelled,
-                fmt::format("stopped; the part done is kept in {}.partial, and the same command "
-                            "with --resume goes on from there",
-                            output.string()));
+                fmt::format("stopped; the part done is kept in {}, and the same command with "
+                            "--resume goes on from there",
+                            journal.string()));
   }
 }
 
@@ -71,6 +75,9 @@ void PrecomputeCommand::print_summary(const Stage& made, const PrecomputeReport&
   fmt::print("{:.1f} MiB, {:.1f} million rays, {:.1f} s, measured picture error {:.3g}\n",
              static_cast<double>(report.bytes) / (1024.0 * 1024.0),
              static_cast<double>(report.rays) * 1e-6, report.seconds, report.measured_error);
+  if (report.resumed_tiles > 0) {
+    fmt::print("{} of {} tiles were there already\n", report.resumed_tiles, report.tiles);
+  }
 }
 
 }  // namespace

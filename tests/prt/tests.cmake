@@ -1,3 +1,6 @@
 haarlight_test(prt/lighting_tracker haarlight_prt)
 haarlight_test(prt/row_sums haarlight_prt)
 haarlight_test(prt/transport haarlight_prt)
+haarlight_test(prt/metrics_csv haarlight_prt)
+haarlight_test(prt/motion_background haarlight_prt)
+haarlight_test(prt/relight_sequence haarlight_prt)

@@ -1,0 +1,206 @@
+// Bad files and places: one line that names them, exit code 1, nothing half-written, nothing lost.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "core/image_io.h"
+#include "tests/apps/inputs.h"
+#include "tests/apps/program_runner.h"
+
+namespace haarlight {
+namespace {
+
+namespace fs = std::filesystem;
+using fixtures::ProgramResult;
+using fixtures::read_bytes;
+using fixtures::run_program;
+using fixtures::write_bytes;
+
+/// A folder with a good scene, a good environment and a good transport.
+class BadInput : public testing::Test {
+ protected:
+  void SetUp() override {
+    fixtures::write_table_scene(path("table.obj"));
+    save_image(path("room.exr"), fixtures::room_environment());
+    const ProgramResult made =
+        run({"precompute", "table.obj", "-o", "table.hlt", "--size", "24x16", "--face", "8"});
+    ASSERT_EQ(made.code, 0) << made.err;
+  }
+
+  fs::path path(const std::string& name) const { return folder_.path() / name; }
+
+  ProgramResult run(const std::vector<std::string>& arguments) const {
+    return run_program(arguments, folder_.path());
+  }
+
+  /// The names in the folder, but for the files that hold what the program said.
+  std::vector<std::string> names() const {
+    std::vector<std::string> found;
+    for (const auto& entry : fs::recursive_directory_iterator(folder_.path())) {
+      const std::string name = fs::relative(entry.path(), folder_.path()).string();
+      if (name != ".stdout" && name != ".stderr") found.push_back(name);
+    }
+    std::sort(found.begin(), found.end());
+    return found;
+  }
+
+  /// Exit code 1 and one line, the last, that holds each of `said`; no new file, none gone.
+  void expect_stated_error(const std::vector<std::string>& arguments,
+                           const std::vector<std::string>& said) const {
+    std::string shown;
+    for (const std::string& word : arguments) shown += word + " ";
+    SCOPED_TRACE(shown);
+    const std::vector<std::string> before = names();
+    const ProgramResult result = run(arguments);
+    EXPECT_EQ(result.code, 1);
+    const std::size_t begin = result.err.find("haarlight: ");
+    ASSERT_NE(begin, std::string::npos) << result.err;
+    EXPECT_TRUE(begin == 0 || result.err[begin - 1] == '\n') << result.err;
+    const std::string line = result.err.substr(begin);
+    EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1) << result.err;
+    EXPECT_EQ(line.back(), '\n') << result.err;
+    for (const std::string& part : said) {
+      EXPECT_NE(line.find(part), std::string::npos) << "'" << part << "' in " << line;
+    }
+    EXPECT_EQ(names(), before);
+  }
+
+  std::vector<std::string> relight(const std::string& transport, const std::string& env) const {
+    return {"relight", transport, "--env", env, "--frames", "2", "-o", "out", "--metrics", "m.csv"};
+  }
+
+ private:
+  fixtures::TemporaryFolder folder_;
+};
+
+TEST_F(BadInput, GoodInputIsTaken) {
+  // Else every other test here would pass for a program that refuses everything.
+  const ProgramResult result = run(relight("table.hlt", "room.exr"));
+  EXPECT_EQ(result.code, 0) << result.err;
+  EXPECT_TRUE(fs::exists(path("out/frame_0001.exr")));
+  EXPECT_TRUE(fs::exists(path("m.csv")));
+}
+
+TEST_F(BadInput, Environments) {
+  expect_stated_error(relight("table.hlt", "none.exr"), {"none.exr"});
+  expect_stated_error(relight("table.hlt", "."), {"."});
+
+  const std::string good = read_bytes(path("room.exr"));
+  write_bytes(path("cut.exr"), good.substr(0, good.size() / 2));
+  expect_stated_error(relight("table.hlt", "cut.exr"), {"cut.exr"});
+
+  write_bytes(path("text.exr"), "this is no picture\n");
+  expect_stated_error(relight("table.hlt", "text.exr"), {"text.exr"});
+  write_bytes(path("empty.hdr"), "");
+  expect_stated_error(relight("table.hlt", "empty.hdr"), {"empty.hdr"});
+
+  Image not_finite = fixtures::room_environment();
+  for (Rgb& pixel : not_finite.pixels) pixel.r = std::numeric_limits<float>::quiet_NaN();
+  save_image(path("nan.exr"), not_finite);
+  expect_stated_error(relight("table.hlt", "nan.exr"), {"nan.exr", "not finite"});
+
+  Image odd(50, 31);
+  save_image(path("odd.exr"), odd);
+  expect_stated_error(relight("table.hlt", "odd.exr"), {"odd.exr", "50", "31"});
+
+  std::vector<std::string> blend = relight("table.hlt", "room.exr");
+  blend.insert(blend.end(), {"--motion", "blend", "--env-to", "text.exr"});
+  expect_stated_error(blend, {"text.exr"});
+}
+
+TEST_F(BadInput, Scenes) {
+  const auto precompute = [](const std::string& scene) {
+    return std::vector<std::string>{"precompute", scene,   "-o",     "new.hlt",
+                                    "--size",     "24x16", "--face", "8"};
+  };
+  expect_stated_error(precompute("none.obj"), {"none.obj"});
+  write_bytes(path("points.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
+  expect_stated_error(precompute("points.obj"), {"points.obj", "triangle"});
+  write_bytes(path("line.obj"), "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
+  expect_stated_error(precompute("line.obj"), {"line.obj", "triangle"});
+  write_bytes(path("noise.glb"), std::string(100, '\x07'));
+  expect_stated_error(precompute("noise.glb"), {"noise.glb"});
+  expect_stated_error({"precompute", "table.obj", "--view", "scene", "-o", "new.hlt"},
+                      {"table.obj", "camera"});
+}
+
+TEST_F(BadInput, Transports) {
+  expect_stated_error(relight("none.hlt", "room.exr"), {"none.hlt"});
+  expect_stated_error(relight("room.exr", "room.exr"), {"room.exr"});
+  write_bytes(path("empty.hlt"), "");
+  expect_stated_error({"info", "empty.hlt"}, {"empty.hlt"});
+
+  // A cut or a flipped bit: a few places spread over the file.
+  const std::string good = read_bytes(path("table.hlt"));
+  for (int part = 0; part < 4; ++part) {
+    const std::size_t place = good.size() * static_cast<std::size_t>(part) / 4 + 5;
+    write_bytes(path("cut.hlt"), good.substr(0, place));
+    expect_stated_error({"info", "cut.hlt"}, {"cut.hlt"});
+    std::string flipped = good;
+    flipped[place] = static_cast<char>(flipped[place] ^ 0x10);
+    write_bytes(path("bad.hlt"), flipped);
+    expect_stated_error({"info", "bad.hlt"}, {"bad.hlt"});
+  }
+  expect_stated_error(relight("bad.hlt", "room.exr"), {"bad.hlt"});
+  write_bytes(path("long.hlt"), good + "more");
+  expect_stated_error({"info", "long.hlt"}, {"long.hlt"});
+}
+
+TEST_F(BadInput, OutputsThatCannotBeMade) {
+  // A file where a folder must be stops everybody, root too.
+  write_bytes(path("file"), "here before");
+  expect_stated_error({"relight", "table.hlt", "--env", "room.exr", "-o", "file"}, {"file"});
+  expect_stated_error({"relight", "table.hlt", "--env", "room.exr", "-o", "file/below"}, {"file"});
+  expect_stated_error({"relight", "table.hlt", "--env", "room.exr", "--metrics", "file/m.csv"},
+                      {"file/m.csv"});
+  expect_stated_error({"precompute", "table.obj", "-o", "file/a.hlt"}, {"file/a.hlt"});
+  expect_stated_error({"precompute", "table.obj", "-o", "nowhere/a.hlt"}, {"nowhere/a.hlt"});
+  EXPECT_EQ(read_bytes(path("file")), "here before");
+}
+
+TEST_F(BadInput, OldOutputsAreKeptWhenARunFails) {
+  write_bytes(path("m.csv"), "old metrics");
+  fs::create_directory(path("out"));
+  write_bytes(path("out/frame_0000.exr"), "old picture");
+  write_bytes(path("broken.obj"), "v 0 0 0\n");
+  const std::string transport = read_bytes(path("table.hlt"));
+
+  expect_stated_error(relight("table.hlt", "none.exr"), {"none.exr"});
+  expect_stated_error({"precompute", "broken.obj", "-o", "table.hlt"}, {"broken.obj"});
+
+  // Frame 1 cannot be written: its name is a folder. Frame 0 was done, and is there whole.
+  fs::create_directory(path("out/frame_0001.exr"));
+  std::vector<std::string> pictures = relight("table.hlt", "room.exr");
+  pictures.insert(pictures.end(), {"--formats", "exr"});
+  expect_stated_error(pictures, {"out/frame_0001.exr"});
+  EXPECT_EQ(load_image(path("out/frame_0000.exr")).width, 24);
+
+  EXPECT_EQ(read_bytes(path("m.csv")), "old metrics");
+  EXPECT_EQ(read_bytes(path("table.hlt")), transport);
+}
+
+TEST_F(BadInput, RepairsAreSaidOnceAndTheWorkGoesOn) {
+  Image ringing = fixtures::room_environment();
+  ringing.at(3, 4) = {-0.5f, 0.2f, 0.1f};
+  ringing.at(9, 9) = {0.1f, -2.0f, 0.1f};
+  save_image(path("ringing.exr"), ringing);
+  const ProgramResult result = run(relight("table.hlt", "ringing.exr"));
+  EXPECT_EQ(result.code, 0) << result.err;
+  const std::string line = "ringing.exr: 2 pixels with negative radiance (down to -2) set to 0\n";
+  const std::size_t place = result.err.find(line);
+  ASSERT_NE(place, std::string::npos) << result.err;
+  EXPECT_EQ(result.err.find("negative", place + line.size()), std::string::npos);
+}
+
+TEST_F(BadInput, Comparisons) {
+  save_image(path("small.exr"), Image(3, 2));
+  expect_stated_error({"compare", "room.exr", "none.exr"}, {"none.exr"});
+  expect_stated_error({"compare", "room.exr", "small.exr"}, {"128", "3"});
+}
+
+}  // namespace
+}  // namespace haarlight

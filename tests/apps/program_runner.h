@@ -1,0 +1,117 @@
+// Runs the built program in a folder of its own and keeps what it said.
+
+#pragma once
+
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+extern char** environ;
+
+namespace haarlight::fixtures {
+
+/// A folder that goes away with the object.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "haarlight-apps-XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp failed");
+    path_ = name;
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+inline std::string read_bytes(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw std::runtime_error("cannot read " + file.string());
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+inline void write_bytes(const std::filesystem::path& file, const std::string& bytes) {
+  std::ofstream stream(file, std::ios::binary);
+  stream << bytes;
+  if (!stream.flush()) throw std::runtime_error("cannot write " + file.string());
+}
+
+/// What a run of the program came to.
+struct ProgramResult {
+  int code = -1;  ///< exit code; -1 when it was killed by a signal
+  std::string out, err;
+};
+
+/// A started program; `command` is relative to `folder`, which is its working folder.
+class Program {
+ public:
+  Program(const std::vector<std::string>& arguments, const std::filesystem::path& folder)
+      : out_(folder / ".stdout"), err_(folder / ".stderr") {
+    std::vector<std::string> words{HAARLIGHT_PROGRAM};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    std::vector<char*> argv;
+    for (std::string& word : words) argv.push_back(word.data());
+    argv.push_back(nullptr);
+
+    // Threads that wait sleep rather than spin: tests run beside each other on few cores.
+    ::setenv("OMP_WAIT_POLICY", "passive", 1);
+
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_addchdir_np(&actions, folder.c_str());
+    posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, out_.c_str(),
+                                     O_WRONLY | O_CREAT | O_TRUNC, 0644);
+    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, err_.c_str(),
+                                     O_WRONLY | O_CREAT | O_TRUNC, 0644);
+    const int error =
+        posix_spawn(&process_, HAARLIGHT_PROGRAM, &actions, nullptr, argv.data(), environ);
+    posix_spawn_file_actions_destroy(&actions);
+    if (error != 0) throw std::runtime_error("cannot start " HAARLIGHT_PROGRAM);
+  }
+
+  bool running() {
+    if (!ended_) ended_ = ::waitpid(process_, &status_, WNOHANG) == process_;
+    return !ended_;
+  }
+  void interrupt() { ::kill(process_, SIGINT); }
+
+  ProgramResult wait() {
+    while (!ended_) {
+      ended_ = ::waitpid(process_, &status_, 0) == process_ || errno != EINTR;
+    }
+    return {WIFEXITED(status_) ? WEXITSTATUS(status_) : -1, read_bytes(out_), read_bytes(err_)};
+  }
+
+ private:
+  std::filesystem::path out_, err_;
+  pid_t process_ = -1;
+  int status_ = 0;
+  bool ended_ = false;
+};
+
+inline ProgramResult run_program(const std::vector<std::string>& arguments,
+                                 const std::filesystem::path& folder) {
+  return Program(arguments, folder).wait();
+}
+
+}  // namespace haarlight::fixtures

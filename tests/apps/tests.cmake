@@ -1,0 +1,6 @@
+foreach(source apps/command_line apps/bad_input apps/end_to_end)
+  haarlight_test(${source} haarlight_core nlohmann_json::nlohmann_json)
+  string(REPLACE "/" "_" name ${source})
+  target_compile_definitions(test_${name} PRIVATE HAARLIGHT_PROGRAM="$<TARGET_FILE:haarlight>")
+  add_dependencies(test_${name} haarlight)
+endforeach()
