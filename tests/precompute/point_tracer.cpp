@@ -105,8 +105,9 @@ TEST(PointTracer, GeometricHorizonCutsTheSmoothOne) {
   const DirectionTable table(64, 4);
   for (const double angle : {0.1, 0.5, 1.0}) {
     const Vec3 normal{std::sin(angle), std::cos(angle), 0};
+    // Hanging free below the quad, upside down: nothing but the horizon itself can cut.
     const Gathered g =
-        gather(visibility, table, point_at(visibility, {0, 0, 0}, {0, 1, 0}, normal), true);
+        gather(visibility, table, point_at(visibility, {0, -100, 0}, {0, -1, 0}, -normal), true);
     // Along the geometric horizon, length pi, the integrand jumps by up to sin a / pi: a sample
     // on the wrong side costs its solid angle. With errors of at most one sample's width s in
     // 64 * 2 columns of independent sign: 4 sigma of sqrt(128) * (2/n) * s / sqrt(12) * sin a / pi.
@@ -191,6 +192,79 @@ TEST(PointTracer, AdaptiveAgreesWithAllRays) {
   }
   EXPECT_LE(differing, 12);
   EXPECT_NEAR(fast.lobe_sum(), full.lobe_sum(), 0.01 * full.lobe_sum());
+}
+
+// Counts rays as the header promises them, from plain loops: one a texel, the other samples where
+// a first sample's visibility differs from a neighbour's or a horizon crosses the texel.
+TEST(PointTracer, TracesExactlyTheRaysItPromises) {
+  Scene scene = shapes::empty_scene();
+  shapes::add_sphere(scene, {0.4, 1, 0.2}, 0.6, 5);
+  shapes::add_box(scene, {-2, 0.2, -2}, {-1, 1.5, 2});
+  const Visibility visibility(scene);
+  for (const int n : {4, 32, 64, 128}) {
+    const DirectionTable table(n, 4);
+    const Vec3 up{0, 1, 0};
+    const ShadingPoint point = point_at(visibility, {0, 0, 0}, up, up);
+    const Gathered fast = gather(visibility, table, point, true);
+
+    const auto size = static_cast<std::size_t>(n);
+    std::vector<int> state(table.texels(), -1);  // of the first sample: -1 unknown, 0 blocked, 1
+    std::vector<bool> close(table.texels(), false);
+    for (const DirectionTable::Packet& p : table.packet) {
+      const unsigned blocked = visibility.occluded8(point.origin, p.x, p.y, p.z, 0xff);
+      for (unsigned lane = 0; lane < 8; ++lane) {
+        const auto k = static_cast<std::size_t>((lane < 4 ? p.top : p.bottom)) + lane % 4;
+        if (p.y[lane] > 0) state[k] = (blocked >> lane & 1u) ? 0 : 1;
+        // The horizon y = 0 runs along texel borders; texels within reach of it count as crossed.
+        close[k] = std::abs(p.cy[lane]) <= p.radius;
+      }
+    }
+    std::vector<bool> refined = close;
+    const auto compare = [&](std::size_t a, std::size_t b) {
+      if (state[a] >= 0 && state[b] >= 0 && state[a] != state[b]) refined[a] = refined[b] = true;
+    };
+    for (std::size_t k = 0; k < table.texels(); ++k) {
+      if (k % size + 1 < size) compare(k, k + 1);
+      if (k / size % size + 1 < size) compare(k, k + size);
+    }
+    for (const auto& [a, b] : table.seam) {
+      compare(static_cast<std::size_t>(a), static_cast<std::size_t>(b));
+    }
+    std::int64_t expected = 0;
+    for (std::size_t k = 0; k < table.texels(); ++k) {
+      if (state[k] >= 0) ++expected;
+      if (!refined[k]) continue;
+      for (std::size_t s = 1; s < 4; ++s) expected += table.sample[4 * k + s].y > 0;
+    }
+    EXPECT_EQ(fast.counts.shadow, expected) << "n " << n;
+  }
+}
+
+// A wall whose upper edge lies just beyond an edge of the cube: only the neighbours on the other
+// face tell that the outermost texels need a closer look.
+TEST(PointTracer, OutlinesAlongAnEdgeOfTheCubeAreSeen) {
+  const int n = 32;
+  Scene scene = shapes::empty_scene();
+  // Seen from the origin it blocks (1, y, z) for y < 1 / (1 - 1/n): the outer half of the last
+  // column of face +Y (u > 1 - 1/n), not that column's first sample.
+  const double top = 1 / (1 - 1.0 / n);
+  shapes::add_quad(scene, {1, -3, -4}, {0, top + 3, 0}, {0, 0, 8});
+  const Visibility visibility(scene);
+  const DirectionTable table(n, 4);
+  const Vec3 normal = normalize(Vec3{1, 1, 0});
+  const ShadingPoint point = point_at(visibility, {0, 0, 0}, normal, normal);
+  const Gathered fast = gather(visibility, table, point, true);
+  const Gathered full = gather(visibility, table, point, false);
+  int partly = 0;
+  for (int y = 0; y < n; ++y) {
+    const std::size_t k = cube_index(2, n - 1, y, n);
+    EXPECT_NEAR(fast.lambert[k], full.lambert[k], 1e-6f * full.lambert[k]);
+    const float open = static_cast<float>(normal.x) * table.moment_x[k] +
+                       static_cast<float>(normal.y) * table.moment_y[k];
+    const float share = full.lambert[k] * static_cast<float>(kPi) / open;
+    partly += share > 0.4f && share < 0.6f;
+  }
+  EXPECT_EQ(partly, n);
 }
 
 // Furnace: seen straight on under an open sky the lobe returns 1.
