@@ -159,6 +159,8 @@ TEST_F(BadInput, OutputsThatCannotBeMade) {
                       {"file/m.csv"});
   expect_stated_error({"precompute", "table.obj", "-o", "file/a.hlt"}, {"file/a.hlt"});
   expect_stated_error({"precompute", "table.obj", "-o", "nowhere/a.hlt"}, {"nowhere/a.hlt"});
+  // The place is tried before the scene is even read, let alone traced.
+  expect_stated_error({"precompute", "none.obj", "-o", "file/a.hlt"}, {"file/a.hlt"});
   EXPECT_EQ(read_bytes(path("file")), "here before");
 }
 
