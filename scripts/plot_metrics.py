@@ -82,17 +82,15 @@ def read_runs(files):
 
 
 def name_runs(runs):
-    """The shortest names that tell the runs apart: method and budget, then weight, then file."""
-    short = lambda run: run.method if run.method == "reference" else f"{run.method.upper()}-{run.wavelets}"
-    for make in (
-        short,
-        lambda run: f"{short(run)} {run.weight}",
-        lambda run: f"{short(run)} {run.weight} ({run.file})",
-    ):
+    """Method and budget; where that is not enough to tell runs apart, weight, then file."""
+    for run in runs:
+        exact = run.method == "reference"
+        run.label = run.method if exact else f"{run.method.upper()}-{run.wavelets}"
+    for more in (lambda run: run.weight, lambda run: f"({run.file})"):
+        labels = [run.label for run in runs]
         for run in runs:
-            run.label = make(run)
-        if len({run.label for run in runs}) == len(runs):
-            return
+            if labels.count(run.label) > 1:
+                run.label += " " + more(run)
 
 
 def mean_or_nan(values):
