@@ -173,12 +173,15 @@ def plot(runs, stop, title, file):
         for run in shown:
             axis.plot(run.frame, values_of(run), color=colours[run.label], label=run.label, lw=1.6)
         axis.set_ylabel(name)
-        axis.set_ylim(0, 1.2 * max(axis.dataLim.ymax, 1e-6))  # room for the legend
+        axis.set_ylim(0, 1.3 * max(axis.dataLim.ymax, 1e-6))  # room for the legend
         axis.grid(alpha=0.25)
         axis.axvline(stop, color="0.5", lw=1, ls="--")
-    error_axes[0].legend(loc="upper left", ncols=min(4, len(shown)), frameon=False)
-    error_axes[0].annotate("light rests", (stop, 1), (3, -3), xycoords=("data", "axes fraction"),
-                           textcoords="offset points", va="top", color="0.4", fontsize=9)
+    long_names = max(len(run.label) for run in shown) > 16
+    error_axes[0].legend(loc="upper left", ncols=min(2 if long_names else 4, len(shown)),
+                         frameon=False, fontsize=8 if long_names else 10)
+    error_axes[0].annotate("light rests", (stop, 1), (0, 3), xycoords=("data", "axes fraction"),
+                           textcoords="offset points", ha="center", va="bottom", color="0.4",
+                           fontsize=9)
     if title:
         error_axes[0].set_title(title)
 
@@ -188,7 +191,8 @@ def plot(runs, stop, title, file):
                     extent=(run.frame[0] - 0.5, run.frame[-1] + 0.5, bands - 0.5, -0.5))
         axis.set_yticks(range(bands))
         axis.tick_params(axis="y", labelsize=6, length=0)
-        axis.set_ylabel(f"{run.label}\nbands reset", fontsize=8)
+        axis.set_ylabel("bands", fontsize=8)
+        axis.set_title(f"{run.label}: bands reset, coarsest first", loc="left", fontsize=8, pad=3)
     axes[-1].set_xlabel("frame")
     write_atomically(file, figure.savefig)
 
