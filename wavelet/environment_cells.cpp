@@ -33,6 +33,12 @@ EnvironmentCell merge(const Block& block) {
   return cell;
 }
 
+double total_solid_angle(const Block& block) {
+  double sum = 0;
+  for (const EnvironmentCell& piece : block) sum += piece.solid_angle;
+  return sum;
+}
+
 /// How far merging carries light: | sum over pieces of (energy - mean radiance * solid angle) *
 /// distance from the middle |, the largest channel standing for all.
 double displacement(const Block& block) {
@@ -209,7 +215,7 @@ class LatlongCutter {
 class FlatCutter {
  public:
   FlatCutter(const Environment& environment, double width)
-      : environment_(environment), picture_(environment.picture()) {
+      : environment_(environment), picture_(environment.picture()), width_(width) {
     const bool cross = environment.projection() == Projection::vertical_cross;
     // Pixels are biggest in the middle: 2 pi across the disc, 2 (in tangent units) across a face.
     const double pixel = cross ? 6.0 / picture_.width : 2 * kPi / picture_.width;
@@ -236,7 +242,8 @@ class FlatCutter {
           }
         }
         if (block.empty()) continue;
-        if (merge_ > 1) {
+        // Near the rim of a disc a pixel covers little, whatever it was cut in.
+        if (merge_ > 1 || total_solid_angle(block) < 1.5 * width_ * width_) {
           sink(block);
         } else {
           for (const EnvironmentCell& piece : block) sink({piece});
@@ -291,6 +298,7 @@ class FlatCutter {
 
   const Environment& environment_;
   const Image& picture_;
+  double width_;
   int split_ = 1, merge_ = 1, tile_ = 1;
 };
 

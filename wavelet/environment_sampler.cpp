@@ -17,7 +17,7 @@ namespace {
 
 /// Cells a texel that leave less than 1 % of unevenness in the solid angle that arrives; the most
 /// and the least cells in all: memory above, a smooth small cube map below.
-constexpr double kCellsPerTexel = 16, kMostCells = 6.3e6, kLeastCells = 24576;
+constexpr double kCellsPerTexel = 16, kMostCells = 6.3e6, kLeastCells = 6144;
 
 /// Never fewer than this a texel, so that a footprint (below 1 texel at a cube corner) fits 2 x 2.
 constexpr double kLeastCellsPerTexel = 4;
@@ -135,7 +135,7 @@ EnvironmentSampler::EnvironmentSampler(const Environment& environment, int face_
   }
   // Each part has sums of its own for every texel: few where that is much memory, many where a
   // texel has so many cells that rounding would show.
-  parts_ = n_ <= 8 ? 64 : n_ <= 128 ? 8 : n_ <= 256 ? 4 : 2;
+  parts_ = n_ <= 8 ? 256 : n_ <= 128 ? 8 : n_ <= 256 ? 4 : 2;
   scratch_.resize(static_cast<std::size_t>(parts_) * part_stride());
 }
 
@@ -244,10 +244,12 @@ void EnvironmentSampler::project(const Rotation& rotation, Cubemap& out) const {
   const auto sum_parts = [&](int row) {
     const std::size_t first = static_cast<std::size_t>(row) * n;
     for (std::size_t texel = first; texel < first + n; ++texel) {
-      Sums sum = sums[texel];
-      for (std::size_t part = 1; part < static_cast<std::size_t>(parts_); ++part) {
-        sum += scratch_[part * part_stride() + texel];
+      typedef double DoubleSums __attribute__((vector_size(32)));
+      DoubleSums total = {};
+      for (std::size_t part = 0; part < static_cast<std::size_t>(parts_); ++part) {
+        total += __builtin_convertvector(scratch_[part * part_stride() + texel], DoubleSums);
       }
+      const Sums sum = __builtin_convertvector(total, Sums);
       sums[texel] = sum;
       // Cells tile the sphere and are smaller than a texel, so something arrived everywhere.
       means[texel] = sum * (1 / sum[3]);
