@@ -187,6 +187,31 @@ TEST_F(SceneImport, GltfTransformsAndMirroredNodes) {
   expect_near(scene.normal[0], {-1, 0, 0});
 }
 
+// Normals go with the inverse transposed: (0, 0.6, 0.8) scaled by (2, 3, -1) is (0, 0.2, -0.8), and
+// the turn takes +Z to +X.
+TEST_F(SceneImport, GltfNormalsStayAcrossTheirSurface) {
+  const double h = std::sqrt(0.5);
+  const std::string node = R"({"mesh":0,"rotation":[0,)" + std::to_string(h) + ",0," +
+                           std::to_string(h) + R"(],"scale":[2,3,-1]})";
+  std::string text = gltf(node);
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    const std::size_t at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    text.replace(at, from.size(), to);
+  };
+  replace(R"("TEXCOORD_0":1)", R"("NORMAL":1)");
+  replace(R"("byteOffset":36,"byteLength":24)", R"("byteOffset":36,"byteLength":36)");
+  replace(R"("count":3,"type":"VEC2")", R"("count":3,"type":"VEC3")");
+  replace(R"("byteLength":60)", R"("byteLength":72)");
+  const std::size_t data = text.find("base64,") + 7;
+  text.replace(data, text.find('"', data) - data,
+               base64(float_bytes(
+                   {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0.6f, 0.8f, 0, 0.6f, 0.8f, 0, 0.6f, 0.8f})));
+  const Scene scene = import("n.gltf", text);
+  EXPECT_EQ(scene.report.normals_made, 0);
+  for (const Vec3& n : scene.normal) expect_near(n, normalize(Vec3{-0.8, 0.2, 0}));
+}
+
 TEST_F(SceneImport, GltfMaterialsBecomeLambertAndPhong) {
   const auto material = [&](const std::string& pbr) {
     const Scene scene =

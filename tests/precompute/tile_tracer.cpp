@@ -222,6 +222,7 @@ TEST(TileTracer, GlossyColorsNeedThreeChannelsUnlessProportional) {
   // colour * grey row == the row of the channels; matte + lobe, so grey - matte is a lobe of
   // (0.2, 0.1, 0.05) and rgb - matte one of 0.1 in each channel: their ratio is 2, 1, 1/2.
   const auto size = static_cast<std::size_t>(HaarLayout(8).size());
+  double lobes = 0;  // the largest entry that is not Lambert's
   for (std::size_t row = 0; row < kTileRows; ++row) {
     if (grey.coverage[row] == 0) continue;
     if (!(rgb.rgb_blocks >> (row / kBlockRows) & 1u)) continue;
@@ -238,9 +239,11 @@ TEST(TileTracer, GlossyColorsNeedThreeChannelsUnlessProportional) {
         const double even =
             static_cast<double>(rgb.values[(c * kTileRows + row) * size + j]) - base;
         EXPECT_NEAR(proportional, ratio[c] * even, 1e-6);
+        lobes = std::max(lobes, std::abs(even));
       }
     }
   }
+  EXPECT_GT(lobes, 1e-3);
 }
 
 TEST(TileTracer, CoverageIsTheShareOfHits) {

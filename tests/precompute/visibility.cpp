@@ -121,6 +121,31 @@ TEST(Visibility, ClosedBodiesDoNotLeak) {
   }
 }
 
+// Rays aimed at the seams between triangles, the places where a careless intersector leaks.
+TEST(Visibility, SeamsDoNotLeak) {
+  Scene scene = shapes::empty_scene();
+  shapes::add_sphere(scene, {0.1, 0.2, 0.3}, 1, 5);
+  const Visibility visibility(scene);
+  std::mt19937 random(9);
+  std::uniform_real_distribution<double> place(-0.5, 0.5), unit(0.01, 0.99);
+  std::int64_t missed = 0;
+  for (int i = 0; i < 50000; ++i) {
+    const auto origin = to_float({place(random), place(random), place(random)});
+    Packet packet(random);
+    for (int lane = 0; lane < 8; ++lane) {
+      const auto t = static_cast<std::uint32_t>(random() % visibility.triangle_count());
+      const int c = static_cast<int>(random() % 3);
+      const double along = unit(random);
+      const Vec3 on_edge =
+          visibility.corner(t, c) * along + visibility.corner(t, (c + 1) % 3) * (1 - along);
+      packet.set(lane, normalize(on_edge - to_vec(origin)));
+    }
+    missed += 8 - std::popcount(visibility.occluded8(origin, packet.x, packet.y, packet.z, 0xff));
+  }
+  // The closed room's bound: 2e-5 of the rays.
+  EXPECT_LE(missed, 8);
+}
+
 TEST(Visibility, LocalFrameIgnoresPowerOfTwoScale) {
   std::mt19937 random(4);
   Scene scene = shapes::empty_scene();
