@@ -41,6 +41,15 @@ void check_options(const Camera& camera, const PrecomputeOptions& options) {
                 fmt::format("picture size is {}x{}, expected 1x1 to 16384x16384", camera.width,
                             camera.height));
   }
+  const auto& rows = camera.orientation.row;
+  for (const Vec3& v : {camera.position, rows[0], rows[1], rows[2]}) {
+    if (!std::isfinite(v.x) || !std::isfinite(v.y) || !std::isfinite(v.z)) {
+      throw Error(ErrorKind::invalid_argument,
+                  fmt::format("the camera's place or orientation holds ({}, {}, {}), expected "
+                              "finite numbers",
+                              v.x, v.y, v.z));
+    }
+  }
   if (!(camera.vertical_fov > 0) || !(camera.vertical_fov < kPi)) {
     throw Error(ErrorKind::invalid_argument,
                 fmt::format("vertical field of view is {} rad, expected above 0 and below pi",

@@ -190,6 +190,9 @@ TEST_F(PrecomputeImage, RefusesWhatItCannotDoAndLeavesWhatWasThere) {
   camera_.vertical_fov = 4;
   refused("field of view");
   camera_.vertical_fov = 0.8;
+  camera_.position.y = std::nan("");
+  refused("finite");
+  camera_.position.y = 1.5;
   camera_.width = 0;
   refused("0x28");
   camera_.width = 40;
