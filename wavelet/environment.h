@@ -57,13 +57,14 @@ Environment load_environment(const std::filesystem::path& file,
 /// An environment made ready to be turned and averaged onto a cube map, quickly, every frame.
 ///
 /// The picture is cut into cells of nearly equal solid angle, about 16 a texel (more for faces
-/// below 16, 4 from 512 on): pixels that are bigger are split, bilinear inside but keeping the
-/// pixel's energy; smaller ones are merged with their neighbours, except where that would move a
-/// bright light. A cell holds energy (radiance x solid angle), solid angle and centre. project()
-/// turns every cell and hands its energy to the texels below its footprint, across face edges too,
-/// then divides by the solid angle that arrived in the same way. So a constant environment stays
-/// constant, a light of one pixel keeps its energy within 2 % however it is turned, moves smoothly,
-/// and neither vanishes nor flickers. 32 bytes a cell.
+/// below 8, 10 at 256, 4 from 512 on): pixels that are bigger are split, bilinear inside but
+/// keeping the pixel's energy; smaller ones are merged with their neighbours, except where that
+/// would move a bright light. A cell holds energy (radiance x solid angle), solid angle and centre.
+/// project() turns every cell and hands its energy to the texels below its footprint, across face
+/// edges too, then divides by the solid angle that arrived in the same way where light is smooth,
+/// and by the texel's where it is not. So a constant environment stays constant, a light of one
+/// pixel keeps its energy within 2 % however it is turned, moves smoothly, and neither vanishes nor
+/// flickers. 32 bytes a cell.
 class EnvironmentSampler {
  public:
   /// `face_size` is n, a power of two in [1, 1024]. Throws Error{invalid_argument} otherwise.
