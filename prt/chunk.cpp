@@ -132,6 +132,7 @@ ColumnBlocks chunk_column(const std::byte* chunk, int index) {
   const std::size_t units = end - begin - 2;
   const std::size_t s = units - (units + 8) / 9;
   blocks.values = reinterpret_cast<const std::int8_t*>(chunk + std::size_t{16} * end - 16 * s);
+  blocks.bytes = 16 * (end - begin);
   return blocks;
 }
 

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <bit>
 #include <cstddef>
+#include <cstdint>
 #include <utility>
 #include <vector>
 
@@ -18,6 +20,25 @@ namespace {
 // A band's log is folded into a kept picture when streaming it would cost this many pictures of
 // sums. Folding costs the log once more and a read and a write of the picture.
 constexpr std::uint64_t kFoldPictures = 4;
+
+// Above so many columns a chunk's runs are next to each other or past what caches hold.
+constexpr std::size_t kPrefetchColumns = 512;
+
+// Blocks of a chunk that at least one of the columns has: those whose sums are read and written.
+std::uint64_t touched_blocks(const std::vector<ColumnTask>& tasks) {
+  std::uint64_t any[4] = {};
+  for (const ColumnTask& task : tasks) {
+    for (int w = 0; w < 4; ++w) any[w] |= task.blocks.present[w];
+  }
+  std::uint64_t count = 0;
+  for (const std::uint64_t word : any) count += static_cast<std::uint64_t>(std::popcount(word));
+  return count;
+}
+
+void prefetch(const ColumnBlocks& blocks) {
+  const auto* bytes = reinterpret_cast<const char*>(blocks.present);
+  for (std::uint32_t at = 0; at < blocks.bytes; at += 64) __builtin_prefetch(bytes + at, 0, 2);
+}
 
 }  // namespace
 
@@ -111,11 +132,13 @@ struct RowSums::State {
     b.log_bytes = 0;
   }
 
-  // Streams columns into rows laid out as totals. `before` prepares a chunk and says whether it
-  // changed something; `done` is called for changed chunks.
+  // Streams columns into rows laid out as totals; returns the bytes of sums read and written for
+  // them. `before` prepares a chunk and says whether it changed something; `done` is called for
+  // changed chunks.
   template <typename Before>
-  void stream(std::span<const WaveletDelta> columns, std::vector<double>& sums,
-              const Before& before, const ChunkDone& done) {
+  std::uint64_t stream(std::span<const WaveletDelta> columns, std::vector<double>& sums,
+                       const Before& before, const ChunkDone& done) {
+    std::atomic<std::uint64_t> blocks_touched{0};
     parallel_for(transport.chunk_count(), [&](int chunk) {
       thread_local std::vector<ColumnTask> tasks;
       tasks.clear();
@@ -123,13 +146,19 @@ struct RowSums::State {
         const ColumnBlocks blocks = transport.column(chunk, column.index);
         if (!blocks.present) continue;
         tasks.push_back({blocks, {column.delta.r, column.delta.g, column.delta.b}});
+        // A frame's columns are short runs far apart, which the hardware cannot foresee: ask for
+        // all of them at once, so that memory works on many at a time. Long lists run on into each
+        // other by themselves.
+        if (columns.size() <= kPrefetchColumns) prefetch(blocks);
       }
       double* chunk_sums = sums.data() + static_cast<std::size_t>(chunk) * kChunkTotals;
       const bool changed = before(chunk, chunk_sums, !tasks.empty());
       if (tasks.empty() && !changed) return;
       apply_columns(transport.rgb_blocks(chunk), tasks, chunk_sums);
+      blocks_touched.fetch_add(touched_blocks(tasks), std::memory_order_relaxed);
       if (done) done(chunk, chunk_sums);
     });
+    return 2 * blocks_touched.load() * kBlockTotals * sizeof(double);
   }
 
   void fold(Band& b, ApplyStats& stats) {
@@ -140,14 +169,14 @@ struct RowSums::State {
     }
     const bool fresh = !b.kept_lit;
     if (b.kept.empty()) b.kept.resize(totals.size());
-    stream(columns_scratch, b.kept,
-           [&](int, double* sums, bool) {
-             if (fresh) std::fill(sums, sums + kChunkTotals, 0.0);
-             return fresh;
-           },
-           {});
+    stats.sum_bytes += stream(columns_scratch, b.kept,
+                              [&](int, double* sums, bool) {
+                                if (fresh) std::fill(sums, sums + kChunkTotals, 0.0);
+                                return fresh;
+                              },
+                              {});
+    if (fresh) stats.sum_bytes += picture_bytes();
     stats.transport_bytes += b.log_bytes;
-    stats.sum_bytes += 2 * picture_bytes();
     stats.columns += static_cast<int>(columns_scratch.size());
     b.kept_lit = true;
     clear_log(b);
@@ -226,30 +255,29 @@ ApplyStats RowSums::apply(const LightingUpdate& update, const ChunkDone& done) {
     stats.transport_bytes += s.bytes_of[static_cast<std::size_t>(column.index)];
   }
   stats.columns = static_cast<int>(s.columns_scratch.size());
-  std::atomic<std::uint64_t> touched{0};
-  s.stream(
+  std::atomic<std::uint64_t> prepared{0};  // chunk passes over sums, to clear or take back
+  stats.sum_bytes += s.stream(
       s.columns_scratch, s.totals,
       [&](int chunk, double* sums, bool has_columns) {
         std::uint8_t& chunk_lit = s.chunk_lit[static_cast<std::size_t>(chunk)];
         bool changed = false;
         if (from_zero && chunk_lit) {
           std::fill(sums, sums + kChunkTotals, 0.0);
+          prepared.fetch_add(1, std::memory_order_relaxed);
           changed = true;
           chunk_lit = 0;
         }
         for (std::size_t k = 0; k < taken_back_count; ++k) {
           const double* back = taken_back[k] + static_cast<std::size_t>(chunk) * kChunkTotals;
           for (int i = 0; i < kChunkTotals; ++i) sums[i] -= back[i];
+          prepared.fetch_add(3, std::memory_order_relaxed);
           changed = true;
         }
         if (has_columns) chunk_lit = 1;
-        if (has_columns || changed) {
-          touched.fetch_add(1 + (from_zero ? 0 : 1) + taken_back_count, std::memory_order_relaxed);
-        }
         return changed;
       },
       done);
-  stats.sum_bytes += touched.load() * kChunkTotals * sizeof(double);
+  stats.sum_bytes += prepared.load() * kChunkTotals * sizeof(double);
 
   if (s.expect_resets) {
     for (std::size_t b = 0; b < bands; ++b) {

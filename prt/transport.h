@@ -45,6 +45,7 @@ struct ColumnBlocks {
   const std::uint64_t* present = nullptr;  ///< 4 words: bit b says block b is stored; null: none
   const std::uint16_t* scales = nullptr;
   const std::int8_t* values = nullptr;
+  std::uint32_t bytes = 0;  ///< of all three together, from `present` on
 };
 
 /// T itself. Immutable, safe to read from any number of threads; copies share the data.
