@@ -24,7 +24,7 @@ namespace {
 
 // Raised whenever the same input would give other rows.
 constexpr int kTracerVersion = 1;
-constexpr int kPilotTiles = 32;
+constexpr int kPilotTiles = 64;
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

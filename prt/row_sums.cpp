@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/huge_page_vector.h"
 #include "core/parallel.h"
 #include "prt/apply_kernel.h"
 
@@ -62,14 +63,14 @@ struct RowSums::State {
   std::uint64_t picture_bytes() const { return totals.size() * sizeof(double); }
 
   Transport transport;
-  std::vector<double> totals;
+  HugePageVector<double> totals;
   std::vector<std::uint8_t> chunk_lit;  // a chunk of totals holds something other than +0
 
   // What of each band is in the totals: its kept picture (if lit) plus its log.
   struct Band {
     std::vector<int> log;         // coefficients with an entry in `logged`
     std::uint64_t log_bytes = 0;  // of their columns
-    std::vector<double> kept;     // as totals, or not allocated
+    HugePageVector<double> kept;  // as totals, or not allocated
     bool kept_lit = false;
     std::vector<int> shown;  // coefficients that moved since the band was last empty
     int lit = 0;             // how many of them are not zero
@@ -136,7 +137,7 @@ struct RowSums::State {
   // them. `before` prepares a chunk and says whether it changed something; `done` is called for
   // changed chunks.
   template <typename Before>
-  std::uint64_t stream(std::span<const WaveletDelta> columns, std::vector<double>& sums,
+  std::uint64_t stream(std::span<const WaveletDelta> columns, HugePageVector<double>& sums,
                        const Before& before, const ChunkDone& done) {
     std::atomic<std::uint64_t> blocks_touched{0};
     parallel_for(transport.chunk_count(), [&](int chunk) {

@@ -19,16 +19,17 @@ namespace {
 constexpr auto kRows = static_cast<std::size_t>(kTileRows);
 constexpr auto kBlock = static_cast<std::size_t>(kBlockRows);
 
-// Candidate thresholds: 2^(level/2), spanning what a transport's entries span.
-constexpr int kLevels = 64;
+// Candidate thresholds: steps of 2^(1/4), spanning what a transport's entries span.
+constexpr int kLevels = 128;
+constexpr double kStepsAnOctave = 4;
 constexpr double kSmallestThreshold = 1e-9;
 
 int level_of(double rms) {
   if (!(rms > kSmallestThreshold)) return 0;
-  return std::min(kLevels - 1, 1 + static_cast<int>(2 * std::log2(rms / kSmallestThreshold)));
+  return std::min(kLevels - 1, 1 + static_cast<int>(kStepsAnOctave * std::log2(rms / kSmallestThreshold)));
 }
 
-double threshold_of(int level) { return kSmallestThreshold * std::exp2(0.5 * level); }
+double threshold_of(int level) { return kSmallestThreshold * std::exp2(level / kStepsAnOctave); }
 
 // What a squared error of a row weighs in the picture.
 double row_weight(const TileRows& tile, std::size_t row) {
@@ -163,8 +164,9 @@ void ToleranceTuner::add(const TileRows& tile) {
 
 std::vector<float> ToleranceTuner::thresholds() const {
   const State& s = *state_;
-  // Pilot tiles are a sample and rounding comes on top: aim a tenth lower.
-  const double aim = 0.9 * s.error;
+  // Pilot tiles are a sample, users' lights are none of ours, and rounding comes on top: aim a
+  // quarter lower.
+  const double aim = 0.75 * s.error;
   int level = 0;
   for (int i = 0; i < kLevels - 1; ++i) {
     double worst = 0;
