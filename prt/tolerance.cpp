@@ -26,7 +26,8 @@ constexpr double kSmallestThreshold = 1e-9;
 
 int level_of(double rms) {
   if (!(rms > kSmallestThreshold)) return 0;
-  return std::min(kLevels - 1, 1 + static_cast<int>(kStepsAnOctave * std::log2(rms / kSmallestThreshold)));
+  return std::min(kLevels - 1,
+                  1 + static_cast<int>(kStepsAnOctave * std::log2(rms / kSmallestThreshold)));
 }
 
 double threshold_of(int level) { return kSmallestThreshold * std::exp2(level / kStepsAnOctave); }
