@@ -2,11 +2,8 @@
 
 #pragma once
 
-#include <unistd.h>
-
 #include <cmath>
 #include <cstddef>
-#include <filesystem>
 #include <random>
 #include <string>
 #include <vector>
@@ -15,26 +12,11 @@
 #include "prt/tile_codec.h"
 #include "prt/transport.h"
 #include "prt/transport_writer.h"
+#include "tests/core/temporary_folder.h"
 
 namespace haarlight::fixtures {
 
-/// A folder of its own that goes away with the test.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string pattern =
-        (std::filesystem::temp_directory_path() / "haarlight-test-XXXXXX").string();
-    path_ = ::mkdtemp(pattern.data());
-  }
-  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
+using haarlight::TemporaryFolder;
 
 /// Rows whose entries fall off with the band and are about `density` full, some blocks RGB. Entries
 /// differ from row to row, as no real transport's do: the worst case for the coder.

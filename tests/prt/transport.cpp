@@ -307,7 +307,7 @@ TEST(TransportFile, NamesWhatIsWrong) {
   };
   message(folder / "absent.hlt", ErrorKind::missing);
   message(folder.path(), ErrorKind::io);
-  write_bytes(folder / "empty.hlt", {});
+  write_bytes(folder / "empty.hlt", std::vector<char>());
   message(folder / "empty.hlt", ErrorKind::format);
   write_bytes(folder / "text.hlt", std::vector<char>(1000, 'x'));
   EXPECT_NE(message(folder / "text.hlt", ErrorKind::format).find("not a Haarlight transport"),
