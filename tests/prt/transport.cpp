@@ -320,6 +320,30 @@ TEST(TransportFile, NamesWhatIsWrong) {
   EXPECT_NE(message(folder / "newer.hlt", ErrorKind::format).find("version 99"), std::string::npos);
 }
 
+// A crafted file can carry right checksums; the structure of a chunk is checked on its own.
+TEST(Chunk, StructureIsCheckedWithoutTheChecksum) {
+  const HaarLayout layout(2);
+  std::mt19937_64 random(10);
+  const CompressedTile tile = compress_tile(layout, fixtures::random_tile(layout, random, 1, false),
+                                            std::vector<float>{0.0f});
+  const CompressedTile* tiles[] = {&tile};
+  const std::vector<std::byte> right = assemble_chunk(layout, tiles);
+  ASSERT_EQ(check_chunk(layout, right), "");
+  const std::size_t area = column_area_begin(static_cast<std::size_t>(layout.size()));
+  auto fewer_blocks = right;  // column 0 has bytes for four blocks and claims three
+  ASSERT_EQ(fewer_blocks[area], std::byte{0x0f});
+  fewer_blocks[area] = std::byte{0x07};
+  EXPECT_NE(check_chunk(layout, fewer_blocks), "");
+  auto no_number = right;  // the first scale becomes infinite
+  no_number[area + 32] = std::byte{0x80};
+  no_number[area + 33] = std::byte{0x7f};
+  EXPECT_NE(check_chunk(layout, no_number), "");
+  auto far = right;  // column 1 begins past the end
+  far[kChunkHeaderBytes + 6] = std::byte{0x7f};
+  EXPECT_NE(check_chunk(layout, far), "");
+  EXPECT_NE(check_chunk(layout, std::span(right).first(right.size() - 16)), "");
+}
+
 TEST(TransportWriter, AFailedWriteKeepsTheOldFile) {
   const TemporaryFolder folder;
   const SmallTransport small = fixtures::small_transport(2, 8, 8, 9);
