@@ -15,15 +15,41 @@
 
 namespace haarlight {
 
-/// f_r = albedo / pi + specular (e + 2) / (2 pi) max(0, cos alpha)^e, alpha the angle between the
-/// light and the mirror direction of the view: Lambert plus one Phong lobe, normalised so that
-/// `specular` is the lobe's reflectance at normal incidence.
+/// How a surface reflects; all are two-sided.
+enum class SurfaceModel {
+  phong,               ///< Lambert plus one Phong lobe
+  metallic_roughness,  ///< glTF 2.0: Lambert under a GGX lobe, see precompute/bsdf.h
+  mirror,              ///< perfect reflection of share `albedo`
+  glass                ///< smooth dielectric: Fresnel reflection and refraction
+};
+
+/// phong: f_r = albedo / pi + specular (e + 2) / (2 pi) max(0, cos alpha)^e, alpha the angle
+/// between the light and the mirror direction of the view, so that `specular` is the lobe's
+/// reflectance at normal incidence.
 struct Material {
   std::string name;
-  Rgb albedo{0.5f, 0.5f, 0.5f};  ///< linear, [0, 1]; multiplied by the texture if there is one
-  int texture = -1;              ///< index into Scene::textures, or none
-  Rgb specular{0, 0, 0};         ///< linear, [0, 1]
-  float exponent = 32;           ///< Phong e, >= 0
+  SurfaceModel model = SurfaceModel::phong;
+  Rgb albedo{0.5f, 0.5f, 0.5f};  ///< linear, [0, 1]; times the base texture if there is one. phong:
+                                 ///< diffuse reflectance; metallic_roughness: base colour; mirror:
+                                 ///< reflectance; glass: what passes a surface besides Fresnel
+  int texture = -1;              ///< base colour: index into Scene::texture, or none
+  // phong
+  Rgb specular{0, 0, 0};  ///< linear, [0, 1]
+  float exponent = 32;    ///< Phong e, >= 0
+  // metallic_roughness
+  float metallic = 0;                   ///< [0, 1]; times blue of its texture
+  float roughness = 1;                  ///< perceptual, [0, 1]; times green of its texture
+  int metallic_roughness_texture = -1;  ///< index into Scene::texture (linear values), or none
+  float transmission = 0;  ///< [0, 1]: share of the diffuse part that passes straight through a
+                           ///< thin wall instead (KHR_materials_transmission without volume)
+  // metallic_roughness and glass
+  float ior = 1.5f;   ///< index of refraction, >= 1
+  Rgb extinction{};   ///< glass: 1/m inside; light is weakened by exp(-extinction distance)
+  bool thin = false;  ///< glass: a pane without inside: passes straight, both surfaces at once
+  // all
+  int normal_texture = -1;  ///< tangent-space normals as in glTF (linear values), or none
+  float normal_scale = 1;   ///< of their x and y
+  float alpha_cutoff = 0;   ///< above 0: holes where the base texture's alpha is below it
 };
 
 struct Triangle {
@@ -39,7 +65,9 @@ struct SceneReport {
   std::int64_t dropped_not_triangle = 0;  ///< points and lines
   std::int64_t normals_made = 0;          ///< vertices whose normal was missing, zero or not finite
   std::int64_t unused_vertices = 0;       ///< that no triangle used: removed
-  std::int64_t textures_missing = 0;  ///< named by the file, not there: the plain colour is used
+  std::int64_t textures_missing = 0;   ///< named by the file, not there: the plain colour is used
+  std::int64_t blended_materials = 0;  ///< alpha blending: taken as holes below one half
+  std::int64_t rough_glass = 0;        ///< transmission with roughness: taken as smooth
 };
 
 struct Scene {
@@ -49,9 +77,10 @@ struct Scene {
   std::vector<std::array<float, 2>> uv;  ///< one a vertex, v up; (0, 0) where there is none
   std::vector<Rgb> tint;  ///< one a vertex, linear, multiplies the albedo; empty: all white
   std::vector<Triangle> triangle;
-  std::vector<Material> material;  ///< at least one
-  std::vector<Image> texture;      ///< linear base colour, repeating
-  std::optional<Camera> camera;    ///< of the file, if it has one
+  std::vector<Material> material;         ///< at least one
+  std::vector<Image> texture;             ///< linear, repeating
+  std::vector<std::vector<float>> alpha;  ///< one a texture, as many as pixels; empty: all 1
+  std::optional<Camera> camera;           ///< of the file, if it has one
   SceneReport report;
 };
 

@@ -1,0 +1,108 @@
+// What a surface does to light at one point, seen from one direction.
+//
+//   f_r cos = diffuse_out (x) diffuse_in(w)          Lambert, or Lambert below a dielectric coat
+//           + gloss_first (x) lobe.first(w)          a lobe: Phong, or GGX with Fresnel split as
+//           + gloss_second (x) lobe.second(w)        F = F0 (1 - s) + s, s = (1 - w.h)^5
+//           + mirror and glass: at most two single directions
+//
+// so that a point's transport is at most three grey rows times three colours.
+
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+
+#include "core/rgb.h"
+#include "core/vec.h"
+#include "precompute/scene.h"
+
+namespace haarlight {
+
+struct SurfaceHit;
+
+/// A point's BSDF. w is the direction light comes from, o the direction it leaves to (to_viewer);
+/// both unit and away from the surface. Everything is 0 for w below the shading normal's horizon,
+/// except transmitted deltas. A plain value.
+///
+/// GGX (metallic_roughness): alpha = roughness^2, height-correlated Smith masking, Schlick Fresnel
+/// with F0 = mix(((ior - 1) / (ior + 1))^2, base colour, metallic). The lobe is scaled by
+/// 1 + F0 (1 - E(o)) / E(o), E the lobe's albedo at F = 1, so that rough metal keeps its energy
+/// (Turquin 2019). The diffuse part lies below the coat: (1 - metallic) base / pi times
+/// (1 - C(o)) (1 - C(w)) / (1 - C_mean), C the coat's albedo at F0 of the dielectric, so that
+/// diffuse and coat together reflect all at base = 1 (Kelemen and Szirmay-Kalos 2001).
+/// Roughness below 0.03 is a mirror (delta) instead of a lobe.
+struct Bsdf {
+  Vec3 geometric_normal;  ///< unit, on the viewer's side
+  Vec3 normal;            ///< shading normal, unit, on the side of geometric_normal
+  Vec3 to_viewer;         ///< unit
+
+  // Diffuse.
+  RgbD diffuse_reflectance;  ///< (1 - metallic) base colour, or the albedo; 0: none
+  double coat_f0 = 0;        ///< 0: plain Lambert
+  // Lobe.
+  enum class Lobe { none, phong, ggx };
+  Lobe lobe = Lobe::none;
+  double width = 0;   ///< Phong: exponent e; GGX: alpha
+  RgbD gloss_first;   ///< colour of lobe_values().first, energy compensation included
+  RgbD gloss_second;  ///< colour of lobe_values().second; 0 for Phong
+  // Single directions.
+  struct Delta {
+    Vec3 direction;            ///< where the light comes from, unit
+    RgbD weight;               ///< share of its radiance that leaves towards the viewer
+    bool transmitted = false;  ///< continues on the other side of the surface
+    bool enters = false;  ///< transmitted into glass (thick): extinction applies until it exits
+  };
+  std::array<Delta, 2> delta{};
+  int delta_count = 0;
+
+  bool has_diffuse() const { return l1_norm(diffuse_reflectance) > 0; }
+  bool has_lobe() const { return lobe != Lobe::none; }
+  /// Only single directions: mirror or glass.
+  bool is_specular() const { return delta_count > 0 && !has_diffuse() && !has_lobe(); }
+
+  /// Outgoing factor of the diffuse part towards `o` (unit): reflectance, times the coat's if any.
+  RgbD diffuse_out(const Vec3& o) const;
+  /// Incoming factor, cosine and 1/pi included: max(0, n.w) / pi for Lambert.
+  double diffuse_in(const Vec3& w) const;
+
+  /// Both scalars of the lobe for light from `w` leaving towards `o` (cosine n.w included). Finite
+  /// at grazing directions. `second` is 0 for Phong.
+  struct LobeValues {
+    double first = 0, second = 0;
+  };
+  LobeValues lobe_values(const Vec3& w) const { return lobe_values(w, to_viewer); }
+  LobeValues lobe_values(const Vec3& w, const Vec3& o) const;
+
+  /// A direction of the lobe for to_viewer by two numbers in [0, 1): importance sampled (Phong's
+  /// cosine power, GGX's visible normals), or none when it falls below the horizon.
+  struct Sample {
+    Vec3 direction;
+    double pdf = 0;  ///< per solid angle, > 0
+  };
+  std::optional<Sample> sample_lobe(double u, double v) const;
+  /// The density of sample_lobe() at `w`.
+  double lobe_pdf(const Vec3& w) const;
+
+  /// Reflectances by part, for choosing one at random; each in [0, 1] a channel, about right.
+  RgbD diffuse_albedo() const;
+  RgbD lobe_albedo() const;
+
+  /// The angle (radians) about the lobe's axis that holds most of it; a lobe much wider than a
+  /// texel may be summed over texels, a narrower one must be sampled.
+  double lobe_half_width() const;
+};
+
+/// The BSDF of what a ray has met.
+Bsdf bsdf_at(const Scene& scene, const SurfaceHit& hit);
+
+/// A direction about `normal` with density max(0, n.w) / pi, by two numbers in [0, 1).
+Vec3 cosine_direction(const Vec3& normal, double u, double v);
+
+/// Albedo of the GGX lobe, E = integral of D V n.w dw: for F = F0 (1 - s) + s it is
+/// F0 first + second. From a table computed once, in double; `cosine` and `alpha` in [0, 1].
+Bsdf::LobeValues ggx_albedo(double cosine, double alpha);
+/// Its cosine-weighted mean over the hemisphere.
+Bsdf::LobeValues ggx_mean_albedo(double alpha);
+
+}  // namespace haarlight
