@@ -226,7 +226,14 @@ class Hash {
     for (const std::uint32_t v : t.vertex) add(v);
     add(t.material);
   }
-  void add(const Material& m) { add(m.albedo), add(m.texture), add(m.specular), add(m.exponent); }
+  void add(const Material& m) {
+    add(static_cast<int>(m.model)), add(m.albedo), add(m.texture);
+    add(m.specular), add(m.exponent);
+    add(m.metallic), add(m.roughness), add(m.metallic_roughness_texture), add(m.transmission);
+    add(m.ior), add(m.extinction), add(m.thin);
+    add(m.normal_texture), add(m.normal_scale), add(m.alpha_cutoff);
+  }
+  void add(const std::vector<float>& values) { add_all(values); }
   void add(const Image& i) { add(i.width), add(i.height), add_all(i.pixels); }
   std::string text() const {
     const XXH128_hash_t h = XXH3_128bits_digest(state_);
@@ -250,6 +257,7 @@ std::string precompute_fingerprint(const Scene& scene, const Camera& camera,
   hash.add_all(scene.triangle);
   hash.add_all(scene.material);
   hash.add_all(scene.texture);
+  hash.add_all(scene.alpha);
   hash.add(camera.position);
   for (const Vec3& row : camera.orientation.row) hash.add(row);
   hash.add(camera.vertical_fov), hash.add(camera.width), hash.add(camera.height);

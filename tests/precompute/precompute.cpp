@@ -137,6 +137,22 @@ TEST_F(PrecomputeImage, FingerprintSeesEverythingThatMatters) {
         scene_.tint.assign(scene_.position.size(), Rgb{1, 1, 1});
       },
       [&] { scene_.texture.emplace_back(2, 1); },
+      [&] { scene_.alpha.resize(1); },
+      [&] {
+        scene_.alpha[0] = {1, 0.5f};
+      },
+      [&] { scene_.alpha[0][1] = 0.25f; },
+      [&] { scene_.material[0].model = SurfaceModel::glass; },
+      [&] { scene_.material[0].ior = 1.3f; },
+      [&] { scene_.material[0].extinction.g = 2; },
+      [&] { scene_.material[0].thin = true; },
+      [&] { scene_.material[0].metallic = 0.5f; },
+      [&] { scene_.material[0].roughness = 0.5f; },
+      [&] { scene_.material[0].metallic_roughness_texture = 0; },
+      [&] { scene_.material[0].transmission = 0.5f; },
+      [&] { scene_.material[0].normal_texture = 0; },
+      [&] { scene_.material[0].normal_scale = 2; },
+      [&] { scene_.material[0].alpha_cutoff = 0.5f; },
       [&] { camera_.position.z += 1e-12; },
       [&] { camera_.width += 1; },
       [&] { options_.trace.spp = 5; },
