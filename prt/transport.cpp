@@ -90,17 +90,25 @@ TransportHeader read_header(std::span<const std::byte> file, const std::string& 
       std::memcmp(file.data(), kTransportMagic, sizeof kTransportMagic) != 0) {
     damaged(name, "not a Haarlight transport file");
   }
-  if (file.size() < sizeof header) {
+  const auto cut = [&] {
     damaged(name, fmt::format("cut short at {} bytes, inside the header", file.size()));
-  }
-  std::memcpy(&header, file.data(), sizeof header);
-  if (header.version != kTransportVersion) {
-    damaged(name, fmt::format("transport format version {}, this program reads version {}",
+  };
+  if (file.size() < kTransportHeader1Hash + sizeof header.header_hash) cut();
+  std::memcpy(&header.version, file.data() + sizeof header.magic, sizeof header.version);
+  if (header.version < 1 || header.version > kTransportVersion) {
+    damaged(name, fmt::format("transport format version {}, this program reads versions 1 to {}",
                               header.version, kTransportVersion));
   }
-  if (XXH3_64bits(&header, offsetof(TransportHeader, header_hash)) != header.header_hash) {
+  const bool first = header.version == 1;
+  if (!first && file.size() < sizeof header) cut();
+  const std::size_t hashed = first ? kTransportHeader1Hash : offsetof(TransportHeader, header_hash);
+  header = {};
+  std::memcpy(&header, file.data(), hashed);
+  std::memcpy(&header.header_hash, file.data() + hashed, sizeof header.header_hash);
+  if (XXH3_64bits(file.data(), hashed) != header.header_hash) {
     damaged(name, "header is damaged (checksum differs)");
   }
+  if (first) header.terms = 1;
   if (header.file_size != file.size()) {
     damaged(name, fmt::format("{} bytes, expected {}: the file was cut short or grew", file.size(),
                               header.file_size));
@@ -110,6 +118,8 @@ TransportHeader read_header(std::span<const std::byte> file, const std::string& 
 
 TransportInfo info_of(const TransportHeader& header, std::span<const std::byte> meta) {
   TransportInfo info;
+  info.kind = static_cast<TransportKind>(header.kind);
+  info.terms = static_cast<int>(header.terms);
   info.face_size = static_cast<int>(header.face_size);
   info.width = static_cast<int>(header.width);
   info.height = static_cast<int>(header.height);
@@ -130,15 +140,30 @@ void check_shape(const TransportHeader& header, const std::string& name) {
     damaged(name,
             fmt::format("face size {}, expected a power of two from 1 to 1024", header.face_size));
   }
-  const std::uint64_t outputs = std::uint64_t{header.width} * header.height;
+  if (header.kind > 1) {
+    damaged(name, fmt::format("kind {}, expected 0 (picture) or 1 (mesh)", header.kind));
+  }
+  const bool mesh = header.kind == 1;
+  const std::uint32_t most_terms = mesh ? kMaxTerms : 1;
+  if (header.terms < 1 || header.terms > most_terms) {
+    damaged(name, fmt::format("{} terms, expected 1 to {}", header.terms, most_terms));
+  }
+  if (mesh != (header.vertices > 0) || (!mesh && (header.triangles > 0 || header.mesh.size > 0)) ||
+      header.mesh_materials > (mesh ? 1u : 0u)) {
+    damaged(name, fmt::format("{} vertices and {} triangles do not fit a transport of kind {}",
+                              header.vertices, header.triangles, header.kind));
+  }
+  const std::uint64_t outputs =
+      (mesh ? header.vertices : std::uint64_t{header.width} * header.height) * header.terms;
   const std::uint64_t rows = std::uint64_t{header.chunk_count} * kChunkRows;
   const std::uint64_t columns = std::uint64_t{6} * header.face_size * header.face_size;
   // A chunk has at least its table of offsets: this bounds every allocation by the file's size.
   if (header.width == 0 || header.height == 0 || header.width > 65536 || header.height > 65536 ||
       outputs > rows || header.chunk_count > header.file_size / (4 * columns) ||
       rows > 0x7fffffffu) {
-    damaged(name, fmt::format("{} x {} pixels in {} chunks do not fit a file of {} bytes",
-                              header.width, header.height, header.chunk_count, header.file_size));
+    damaged(name, fmt::format(
+                      "{} x {} pixels, {} outputs in {} chunks do not fit a file of {} bytes",
+                      header.width, header.height, outputs, header.chunk_count, header.file_size));
   }
 }
 
@@ -153,13 +178,18 @@ Transport Transport::open(const std::filesystem::path& file) {
   check_shape(header, name);
   auto data = std::make_shared<Data>(static_cast<int>(header.face_size));
   data->info = info_of(header, section_bytes(bytes, header.meta, name, "description"));
+  if (header.kind == 1) {
+    data->info.mesh = std::make_shared<const TransportMesh>(
+        unpack_mesh(section_bytes(bytes, header.mesh, name, "mesh"),
+                    {header.vertices, header.triangles, header.mesh_materials == 1}, name));
+  }
   data->storage = mapping;
   data->file_bytes = bytes.size();
 
   const auto columns = static_cast<std::size_t>(data->layout.size());
   const std::size_t rows = static_cast<std::size_t>(header.chunk_count) * kChunkRows;
   RowTables tables = unpack_tables(section_bytes(bytes, header.rows, name, "row tables"), rows,
-                                   static_cast<std::size_t>(header.width) * header.height, name);
+                                   data->info.output_count(), name);
   data->row_output = std::move(tables.row_output);
   data->row_color = std::move(tables.row_color);
   data->coverage = std::move(tables.coverage);

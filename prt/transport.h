@@ -13,6 +13,7 @@
 
 #include "core/camera.h"
 #include "core/rgb.h"
+#include "prt/transport_mesh.h"
 #include "wavelet/haar.h"
 
 namespace haarlight {
@@ -29,12 +30,31 @@ inline constexpr int kChunkBlocks = kChunkTiles * kTileBlocks;
 inline constexpr int kChunkRows = kChunkTiles * kTileRows;
 inline constexpr std::uint32_t kNoOutput = 0xffffffffu;
 
+/// What the rows of a transport are.
+enum class TransportKind {
+  image,  ///< pixels of one view
+  mesh    ///< vertices, to be looked at from anywhere
+};
+
 /// What a transport is of; kept in its file.
 struct TransportInfo {
+  TransportKind kind = TransportKind::image;
   int face_size = 64;
-  int width = 0, height = 0;  ///< picture size; outputs are width * height pixels
-  Camera camera;              ///< the view, for drawing the environment behind the scene
-  std::string meta;           ///< JSON object: how it was made, its options, measured error
+  int width = 0, height = 0;  ///< picture size; of a mesh, the size to draw it at unless told
+  int terms = 1;  ///< outputs a pixel or vertex, >= 1; above 1 each belongs to a term of
+                  ///< a factored BRDF
+  Camera camera;  ///< the view (of a mesh: the first one)
+  std::shared_ptr<const TransportMesh> mesh;  ///< of kind mesh, else null
+  std::string meta;  ///< JSON object: how it was made, its options, measured error
+
+  /// Rows with a meaning: pixels or vertices, times terms. Output `i * terms + k` is term k of
+  /// pixel y * width + x = i, or of vertex i.
+  std::size_t output_count() const {
+    const std::size_t places =
+        mesh ? mesh->position.size()
+             : static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+    return places * static_cast<std::size_t>(terms);
+  }
 };
 
 /// One column's non-zero blocks inside a chunk.
@@ -53,12 +73,13 @@ class Transport {
  public:
   /// Maps a file and checks every byte of it: sizes before anything is allocated, checksums, and
   /// that each column's blocks lie inside their chunk. Throws Error{missing} if there is no such
-  /// file, Error{format} if it is not one of ours, is cut short, damaged or of another version
+  /// file, Error{format} if it is not one of ours, is cut short, damaged or of a newer version
   /// (the message says which), Error{io} if the system refuses.
   static Transport open(const std::filesystem::path& file);
 
   const HaarLayout& layout() const;
   const TransportInfo& info() const;
+  TransportKind kind() const { return info().kind; }
   int width() const { return info().width; }
   int height() const { return info().height; }
   /// Rows as stored, padding included: chunk_count() * kChunkRows.
@@ -69,12 +90,14 @@ class Transport {
   std::uint64_t chunk_bytes() const;
   std::uint64_t file_bytes() const;
 
-  /// Per stored row: the output (pixel y * width + x) it belongs to, or kNoOutput for padding.
+  /// Per stored row: the output it belongs to (see TransportInfo::output_count), or kNoOutput for
+  /// padding.
   std::span<const std::uint32_t> row_output() const;
   /// Per stored row: the colour its sum is multiplied with: the albedo of a grey row, 1 for an RGB
   /// row.
   std::span<const Rgb> row_color() const;
-  /// Per output: share of the pixel covered by the scene, [0, 1]; the rest shows the environment.
+  /// Per output: share of the pixel covered by the scene, [0, 1]; the rest shows the environment. 1
+  /// for vertices.
   std::span<const float> coverage() const;
   /// Per coefficient: L2 norm over all rows and channels of colour * T[:, j]. The picture's squared
   /// change when coefficient j alone changes by 1 in every channel; the weights of

@@ -12,7 +12,7 @@ static_assert(std::endian::native == std::endian::little,
               "transport files are little-endian and are read without conversion");
 
 inline constexpr char kTransportMagic[8] = {'H', 'a', 'a', 'r', 'l', 't', '\r', '\n'};
-inline constexpr std::uint32_t kTransportVersion = 1;
+inline constexpr std::uint32_t kTransportVersion = 2;  ///< written; 1 is read too
 
 /// A stretch of the file.
 struct FileSection {
@@ -20,26 +20,35 @@ struct FileSection {
   std::uint64_t hash = 0;  ///< XXH3, 64 bits, of its bytes as stored
 };
 
-/// First bytes of the file. All fields are naturally aligned; reserved bytes are zero.
+/// First bytes of the file. All fields are naturally aligned; reserved bytes are zero. Version 1
+/// ends, with its hash, where `terms` stands in version 2, and has kind 0.
 struct TransportHeader {
   char magic[8];
   std::uint32_t version;
   std::uint32_t face_size;
   std::uint32_t width, height;
   std::uint32_t chunk_count;
-  std::uint32_t reserved;
+  std::uint32_t kind;  ///< TransportKind: 0 image, 1 mesh
   std::uint64_t file_size;
   double camera_position[3];
   double camera_orientation[9];  ///< rows
   double camera_vertical_fov;
-  FileSection meta;           ///< JSON text
-  FileSection rows;           ///< zstd of the row tables: see RowTables in transport_tables.h
-  FileSection column_norms;   ///< float, one a coefficient
-  FileSection chunk_table;    ///< FileSection, one a chunk
-  std::uint64_t header_hash;  ///< XXH3 of all bytes above
+  FileSection meta;          ///< JSON text
+  FileSection rows;          ///< zstd of the row tables: see RowTables in transport_tables.h
+  FileSection column_norms;  ///< float, one a coefficient
+  FileSection chunk_table;   ///< FileSection, one a chunk
+  std::uint32_t terms;       ///< outputs a pixel or vertex
+  std::uint32_t vertices, triangles;  ///< of a mesh, else 0
+  std::uint32_t mesh_materials;       ///< 1: the mesh tells a material a vertex
+  FileSection mesh;                   ///< zstd, see prt/transport_mesh.h; empty for a picture
+  std::uint64_t header_hash;          ///< XXH3 of all bytes above
 };
-static_assert(sizeof(TransportHeader) == 8 + 24 + 8 + 13 * 8 + 4 * 24 + 8);
+inline constexpr std::size_t kTransportHeader1Hash = 8 + 24 + 8 + 13 * 8 + 4 * 24;
+static_assert(offsetof(TransportHeader, terms) == kTransportHeader1Hash);
+static_assert(sizeof(TransportHeader) == kTransportHeader1Hash + 16 + 24 + 8);
 
 inline constexpr std::size_t kChunkAlignment = 4096;
+inline constexpr int kMaxTerms = 256;                   ///< a vertex; a picture has one
+inline constexpr std::size_t kMaxOutputs = 0x70000000;  ///< so that padded rows are an int
 
 }  // namespace haarlight

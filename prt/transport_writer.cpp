@@ -36,10 +36,21 @@ void check_info(const TransportInfo& info) {
                 fmt::format("picture size is {}x{}, expected 1 to 65536 each way", info.width,
                             info.height));
   }
-}
-
-std::size_t outputs_of(const TransportInfo& info) {
-  return static_cast<std::size_t>(info.width) * static_cast<std::size_t>(info.height);
+  const int most = info.kind == TransportKind::mesh ? kMaxTerms : 1;
+  if (info.terms < 1 || info.terms > most) {
+    throw Error(ErrorKind::invalid_argument,
+                fmt::format("{} terms, expected 1 to {}", info.terms, most));
+  }
+  if ((info.kind == TransportKind::mesh) != (info.mesh != nullptr)) {
+    throw Error(ErrorKind::invalid_argument,
+                "a mesh is wanted for the transport of a mesh, and for no other");
+  }
+  const std::string wrong = info.mesh ? check_mesh(*info.mesh) : std::string();
+  if (!wrong.empty()) throw Error(ErrorKind::invalid_argument, wrong);
+  if (info.output_count() > kMaxOutputs) {
+    throw Error(ErrorKind::invalid_argument,
+                fmt::format("{} outputs, expected at most {}", info.output_count(), kMaxOutputs));
+  }
 }
 
 // Colours and coverages of a tile into the tables of all rows.
@@ -54,9 +65,9 @@ void place_rows(std::size_t tile, std::span<const Rgb> color, std::span<const fl
 
 RowTables empty_tables(const TransportInfo& info) {
   RowTables tables;
-  tables.row_output = image_row_order(info.width, info.height);
+  tables.row_output = row_order(info);
   tables.row_color.assign(tables.row_output.size(), Rgb{});
-  tables.coverage.assign(outputs_of(info), 0.0f);
+  tables.coverage.assign(info.output_count(), 0.0f);
   return tables;
 }
 
@@ -73,6 +84,13 @@ std::vector<float> norms_of(std::span<const std::vector<double>> chunk_energies,
 
 std::span<const Rgb> chunk_colors(const RowTables& tables, std::size_t chunk) {
   return std::span(tables.row_color).subspan(chunk * kChunkRows, kChunkRows);
+}
+
+// Tiles up to the last with a row in use.
+int used_tiles(std::span<const std::uint32_t> order) {
+  std::size_t rows = order.size();
+  while (rows > 0 && order[rows - 1] == kNoOutput) --rows;
+  return static_cast<int>((rows + kRows - 1) / kRows);
 }
 
 // Appends a section and says where it is.
@@ -92,6 +110,13 @@ TransportHeader header_of(const TransportInfo& info, std::size_t chunks) {
   header.width = static_cast<std::uint32_t>(info.width);
   header.height = static_cast<std::uint32_t>(info.height);
   header.chunk_count = static_cast<std::uint32_t>(chunks);
+  header.kind = static_cast<std::uint32_t>(info.kind);
+  header.terms = static_cast<std::uint32_t>(info.terms);
+  if (info.mesh) {
+    header.vertices = static_cast<std::uint32_t>(info.mesh->position.size());
+    header.triangles = static_cast<std::uint32_t>(info.mesh->triangle.size());
+    header.mesh_materials = info.mesh->material.empty() ? 0 : 1;
+  }
   const Camera& camera = info.camera;
   const double position[3] = {camera.position.x, camera.position.y, camera.position.z};
   std::copy(position, position + 3, header.camera_position);
@@ -135,10 +160,15 @@ TransportWriter::TransportWriter(const std::filesystem::path& file, TransportInf
                 fmt::format("{} thresholds, expected {}, one a band", s.options.thresholds.size(),
                             s.layout.band_count()));
   }
-  s.row_order = image_row_order(s.info.width, s.info.height);
-  s.tiles = ((s.info.width + 7) / 8) * ((s.info.height + 7) / 8);
+  s.row_order = row_order(s.info);
+  s.tiles = used_tiles(s.row_order);
   std::string fingerprint = s.options.fingerprint;
   fingerprint += fmt::format("|{}x{}x{}|", s.info.face_size, s.info.width, s.info.height);
+  if (s.info.mesh) {
+    const std::vector<std::byte> mesh = pack_mesh(*s.info.mesh);
+    fingerprint +=
+        fmt::format("mesh:{}:{:016x}|", s.info.terms, XXH3_64bits(mesh.data(), mesh.size()));
+  }
   for (float threshold : s.options.thresholds) fingerprint += fmt::format("{:a},", threshold);
   std::filesystem::path journal = file;
   journal += ".partial";
@@ -230,6 +260,10 @@ void TransportWriter::finish(const std::string& meta, const Progress& progress) 
   const std::vector<std::byte> packed = pack_tables(tables);
   header.rows = append(out, packed.data(), packed.size());
   header.chunk_table = append(out, sections.data(), sections.size() * sizeof(FileSection));
+  if (s.info.mesh) {
+    const std::vector<std::byte> mesh = pack_mesh(*s.info.mesh);
+    header.mesh = append(out, mesh.data(), mesh.size());
+  }
   nlohmann::json description = nlohmann::json::parse(meta.empty() ? "{}" : meta);
   std::uint64_t chunk_bytes = 0;
   for (const FileSection& section : sections) chunk_bytes += section.size;
@@ -255,8 +289,8 @@ Transport build_transport(TransportInfo info, std::span<const TileRows> tiles,
   const std::size_t chunks = tables.row_output.size() / kChunkRows;
   if (tiles.size() != chunks * kTiles) {
     throw Error(ErrorKind::invalid_argument,
-                fmt::format("{} tiles, expected {} for {}x{} pixels", tiles.size(), chunks * kTiles,
-                            info.width, info.height));
+                fmt::format("{} tiles, expected {} for {} outputs", tiles.size(), chunks * kTiles,
+                            info.output_count()));
   }
   auto buffers = std::make_shared<std::vector<std::vector<std::byte>>>(chunks);
   std::vector<std::vector<double>> energies(chunks);

@@ -19,6 +19,15 @@ namespace haarlight {
 /// to a whole chunk. Its size is a multiple of kChunkRows.
 std::vector<std::uint32_t> image_row_order(int width, int height);
 
+/// The same for a mesh of `terms` outputs a vertex: blocks of 16 vertices that lie near each other
+/// and face the same way, so that they see nearly the same light, one block a term, one group of
+/// vertices after the other. Cut in halves along the longest extent of positions and normals
+/// together, again and again; ties go by vertex number.
+std::vector<std::uint32_t> mesh_row_order(const TransportMesh& mesh, int terms = 1);
+
+/// image_row_order or mesh_row_order, by the kind.
+std::vector<std::uint32_t> row_order(const TransportInfo& info);
+
 /// One tile of exact rows as precomputation makes them: Haar coefficients of
 ///   t[k] = integral over texel k of V f_r cos dw   (f_r without the row's colour if grey).
 struct TileRows {
@@ -26,7 +35,7 @@ struct TileRows {
   std::vector<float> values;    ///< [channel][row][coefficient]; 1 channel (kTileRows rows) when
                                 ///< rgb_blocks == 0, else 3, grey blocks using channel 0 only
   std::vector<Rgb> color;       ///< kTileRows: albedo of grey rows; {1,1,1} for rows of RGB blocks
-  std::vector<float> coverage;  ///< kTileRows: share of the pixel covered by the scene
+  std::vector<float> coverage;  ///< kTileRows: share of the pixel covered by the scene; 1: vertex
 };
 
 /// Finds how small an entry may be dropped, from a few pilot tiles, so that the relative error of
@@ -63,7 +72,7 @@ class TransportWriter {
   ~TransportWriter();
 
   int tile_count() const;
-  /// The outputs of a tile's rows: kTileRows entries of image_row_order.
+  /// The outputs of a tile's rows: kTileRows entries of row_order.
   std::span<const std::uint32_t> tile_outputs(int tile) const;
   bool has_tile(int tile) const;                    ///< already in the journal
   void write_tile(int tile, const TileRows& rows);  ///< thread-safe; compresses outside the lock
@@ -82,7 +91,7 @@ class TransportWriter {
 };
 
 /// A transport in memory from all its tiles; for tests and small uses of the library.
-/// `tiles.size()` is image_row_order(...).size() / kTileRows; a tile without values is empty.
+/// `tiles.size()` is row_order(info).size() / kTileRows; a tile without values is empty.
 Transport build_transport(TransportInfo info, std::span<const TileRows> tiles,
                           const std::vector<float>& thresholds);
 

@@ -2,10 +2,13 @@
 
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <memory>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/rgb.h"
@@ -95,13 +98,66 @@ inline SmallTransport small_transport(int face, int width, int height, std::uint
   return out;
 }
 
+/// A bumpy sphere of at least `vertices` vertices, (3, 2, -5) in its middle.
+inline TransportMesh bumpy_sphere(int vertices, std::uint64_t seed) {
+  const auto around = static_cast<std::uint32_t>(std::ceil(std::sqrt(2.0 * vertices)));
+  const std::uint32_t down = around / 2 + 1;
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> uniform(0.8, 1.2);
+  TransportMesh mesh;
+  mesh.origin = {3, 2, -5};
+  for (std::uint32_t j = 0; j < down; ++j) {
+    for (std::uint32_t i = 0; i < around; ++i) {
+      const double a = 2 * kPi * i / around, b = kPi * (j + 0.5) / down, r = uniform(random);
+      const Vec3 n{std::sin(b) * std::cos(a), std::cos(b), std::sin(b) * std::sin(a)};
+      mesh.normal.push_back(
+          {static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)});
+      mesh.position.push_back(
+          {static_cast<float>(r * n.x), static_cast<float>(r * n.y), static_cast<float>(r * n.z)});
+      if (j + 1 == down) continue;
+      const std::uint32_t p = j * around + i, q = j * around + (i + 1) % around;
+      mesh.triangle.push_back({p, q, p + around});
+      mesh.triangle.push_back({q, q + around, p + around});
+    }
+  }
+  return mesh;
+}
+
+/// The transport of a mesh, `terms` outputs a vertex.
+inline SmallTransport small_mesh_transport(int face, TransportMesh mesh, std::uint64_t seed,
+                                           int terms = 1, float threshold = 0) {
+  const HaarLayout layout(face);
+  std::mt19937_64 random(seed);
+  SmallTransport out;
+  out.info.kind = TransportKind::mesh;
+  out.info.face_size = face;
+  out.info.width = 32;
+  out.info.height = 24;
+  out.info.terms = terms;
+  out.info.mesh = std::make_shared<const TransportMesh>(std::move(mesh));
+  const BoundingSphere sphere = bounding_sphere(*out.info.mesh);
+  out.info.camera = look_at(sphere.center + Vec3{0, 1, 3} * sphere.radius, sphere.center, 0.8,
+                            out.info.width, out.info.height);
+  const auto order = row_order(out.info);
+  out.tiles.resize(order.size() / kTileRows);
+  for (std::size_t t = 0; t < out.tiles.size(); ++t) {
+    const auto first = order.begin() + static_cast<std::ptrdiff_t>(t * kTileRows);
+    if (std::all_of(first, first + kTileRows, [](std::uint32_t o) { return o == kNoOutput; })) {
+      continue;
+    }
+    out.tiles[t] = random_tile(layout, random, 0.4, true);
+    out.tiles[t].coverage.assign(kTileRows, 1.0f);
+  }
+  out.thresholds.assign(static_cast<std::size_t>(layout.band_count()), threshold);
+  return out;
+}
+
 /// T as stored (dropped and rounded), dense: [output][channel][coefficient], colours applied.
 inline std::vector<double> dense(const SmallTransport& small) {
   const HaarLayout layout(small.info.face_size);
   const auto size = static_cast<std::size_t>(layout.size());
-  const auto order = image_row_order(small.info.width, small.info.height);
-  std::vector<double> out(3 * size * static_cast<std::size_t>(small.info.width) *
-                          static_cast<std::size_t>(small.info.height));
+  const auto order = row_order(small.info);
+  std::vector<double> out(3 * size * small.info.output_count());
   std::vector<float> values;
   for (std::size_t t = 0; t < small.tiles.size(); ++t) {
     if (small.tiles[t].values.empty()) continue;
