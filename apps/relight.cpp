@@ -32,6 +32,8 @@ const std::vector<std::string> kFormats{"exr", "png"};
 
 struct RelightCommand {
   std::filesystem::path transport, env, env_to, folder, metrics;
+  std::filesystem::path recording;  // replayed instead of sequence.motion, if there is one
+  std::vector<const CLI::Option*> said_by_recording;
   std::optional<Projection> projection;
   SequenceOptions sequence;
   int every = 1;
@@ -46,15 +48,34 @@ struct RelightCommand {
  private:
   /// Options that are wrong only together.
   void check() const;
-  std::vector<int> frames_to_save() const;
-  void save(const Transport& scene, const Environment& from, const Environment* to,
-            const SequenceFrame& frame, double exposure) const;
+  std::vector<Environment> load(const MotionRecording& replayed) const;
+  std::vector<int> frames_to_save(int frames) const;
+  void save(const SequenceFrame& frame, Image picture, double exposure) const;
 };
+
+void check_choice(const std::string& text) {
+  if (motion_from_name(text)) return;
+  if (std::filesystem::path(text).extension() == ".json") return;
+  refuse_option("--motion", text,
+                "one of still, rotate, tumble, swing, blend, light, or a recording, FILE.json");
+}
 
 void RelightCommand::check() const {
   if (folder.empty() && metrics.empty()) {
     throw CLI::ValidationError("-o", "'', expected a folder for pictures, or --metrics FILE.csv");
   }
+  if (folder.empty() && (!save_frames.empty() || every != 1)) {
+    throw CLI::ValidationError("-o", "'', expected a folder for the frames to save");
+  }
+  if (!recording.empty()) {
+    for (const CLI::Option* option : said_by_recording) {
+      if (option->count() == 0) continue;
+      refuse_option(option->get_name(), option->as<std::string>(),
+                    "nothing, since the recording says it frame by frame");
+    }
+    return;
+  }
+  if (env.empty()) throw CLI::ValidationError("--env", "is required, expected an environment");
   if (sequence.motion.kind == MotionKind::blend && env_to.empty()) {
     throw CLI::ValidationError("--env-to",
                                "'', expected the environment to blend to, since "
@@ -64,34 +85,44 @@ void RelightCommand::check() const {
     refuse_option("--env-to", env_to.string(),
                   "no second environment, since --motion is " + motion_name(sequence.motion.kind));
   }
-  if (folder.empty() && (!save_frames.empty() || every != 1)) {
-    throw CLI::ValidationError("-o", "'', expected a folder for the frames to save");
-  }
 }
 
-std::vector<int> RelightCommand::frames_to_save() const {
+std::vector<int> RelightCommand::frames_to_save(int count) const {
   if (folder.empty()) return {};
-  if (!save_frames.empty()) return parse_frames("--save-frames", save_frames, sequence.frames - 1);
+  if (!save_frames.empty()) return parse_frames("--save-frames", save_frames, count - 1);
   std::vector<int> frames;
-  for (int frame = 0; frame < sequence.frames; frame += every) frames.push_back(frame);
+  for (int frame = 0; frame < count; frame += every) frames.push_back(frame);
   return frames;
+}
+
+/// The environments of a recording; --env and --env-to take the places of its first two.
+std::vector<Environment> RelightCommand::load(const MotionRecording& replayed) const {
+  std::vector<Environment> environments;
+  const auto add = [&](const std::filesystem::path& file) {
+    environments.push_back(load_environment(file, {.projection = projection}));
+    print_repairs(file, environments.back().report());
+  };
+  for (const std::filesystem::path& file : replayed.environments) {
+    const bool first = environments.empty(), second = environments.size() == 1;
+    add(first && !env.empty() ? env : second && !env_to.empty() ? env_to : file);
+  }
+  return environments;
 }
 
 void RelightCommand::run() const {
   check();
-  const std::vector<int> saved = frames_to_save();
 
   // Read what comes in, and find out that what goes out has a place.
+  std::optional<MotionRecording> replayed;
+  if (!recording.empty()) replayed = load_motion_file(recording);
+  const int frames = replayed ? static_cast<int>(replayed->frames.size()) : sequence.frames;
+  const std::vector<int> saved = frames_to_save(frames);
   const Transport scene = Transport::open(transport);
-  const EnvironmentOptions env_options{.projection = projection};
-  const Environment from = load_environment(env, env_options);
-  print_repairs(env, from.report());
-  std::optional<Environment> to;
-  if (!env_to.empty()) {
-    to.emplace(load_environment(env_to, env_options));
-    print_repairs(env_to, to->report());
-  }
-  const Environment* second = to ? &*to : nullptr;
+  MotionRecording plain;
+  plain.environments.push_back(env);
+  if (!env_to.empty()) plain.environments.push_back(env_to);
+  const std::vector<Environment> environments = load(replayed ? *replayed : plain);
+  const Environment* second = environments.size() > 1 ? &environments[1] : nullptr;
   if (!folder.empty()) require_writable_folder(folder);
   std::optional<MetricsCsvWriter> table;
   if (!metrics.empty()) table.emplace(metrics);
@@ -99,26 +130,38 @@ void RelightCommand::run() const {
   // Relight frame by frame. The exposure is chosen once, so that frames can be compared.
   ProgressPrinter progress("relight");
   double exposure = exposure_ev.value_or(0.0);
-  relight_sequence(scene, from, second, sequence, [&](const SequenceFrame& frame) {
+  const FrameDone frame_done = [&](const SequenceFrame& frame) {
+    const int number = frame.metrics.frame;
     if (table) table->add(frame.metrics);
-    if (frame.metrics.frame == 0 && !exposure_ev && !saved.empty()) {
-      exposure =
-          auto_exposure_ev(sequence.from_dark ? relight_once(scene, frame.target) : frame.picture);
+    if (number == 0 && !exposure_ev && !saved.empty()) {
+      const bool dark =
+          replayed ? replayed->frames.front().start != FrameStart::exact : sequence.from_dark;
+      exposure = auto_exposure_ev(dark ? relight_once(scene, frame.target) : frame.picture);
     }
-    if (std::binary_search(saved.begin(), saved.end(), frame.metrics.frame)) {
-      save(scene, from, second, frame, exposure);
+    if (std::binary_search(saved.begin(), saved.end(), number)) {
+      Image picture = frame.picture;
+      if (no_background) {
+        // The scene alone.
+      } else if (replayed) {
+        composite_light_background(scene, replayed->frames[static_cast<std::size_t>(number)].light,
+                                   environments, picture);
+      } else {
+        composite_motion_background(scene, sequence.motion, number, environments.front(), second,
+                                    picture);
+      }
+      save(frame, std::move(picture), exposure);
     }
-    return progress((frame.metrics.frame + 1.0) / sequence.frames);
-  });
+    return progress((number + 1.0) / frames);
+  };
+  if (replayed) {
+    relight_recording(scene, environments, *replayed, sequence.against_reference, frame_done);
+  } else {
+    relight_sequence(scene, environments.front(), second, sequence, frame_done);
+  }
   if (table) table->commit();
 }
 
-void RelightCommand::save(const Transport& scene, const Environment& from, const Environment* to,
-                          const SequenceFrame& frame, double exposure) const {
-  Image picture = frame.picture;
-  if (!no_background) {
-    composite_motion_background(scene, sequence.motion, frame.metrics.frame, from, to, picture);
-  }
+void RelightCommand::save(const SequenceFrame& frame, Image picture, double exposure) const {
   const std::filesystem::path stem = folder / fmt::format("frame_{:04}", frame.metrics.frame);
   for (const std::string& format : formats) {
     const std::filesystem::path file = stem.string() + "." + format;
@@ -135,7 +178,8 @@ Verb add_relight(CLI::App& verb) {
 
   add_path(verb, "FILE", c.transport, "FILE.hlt", "transport file made by haarlight precompute")
       ->required();
-  add_path(verb, "--env", c.env, "FILE", "environment: EXR or HDR, linear radiance")->required();
+  add_path(verb, "--env", c.env, "FILE",
+           "environment: EXR or HDR, linear radiance; a recording names its own");
   add_path(verb, "--env-to", c.env_to, "FILE", "second environment, for --motion blend");
   add_choice<std::optional<Projection>>(verb, "--projection", c.projection,
                                         {{"auto", std::nullopt},
@@ -145,14 +189,20 @@ Verb add_relight(CLI::App& verb) {
                                         "layout of the environments; auto goes by shape: 2:1, 1:1, "
                                         "3:4");
 
-  add_choice<MotionKind>(verb, "--motion", s.motion.kind,
-                         {{"still", MotionKind::still},
-                          {"rotate", MotionKind::rotate},
-                          {"tumble", MotionKind::tumble},
-                          {"swing", MotionKind::swing},
-                          {"blend", MotionKind::blend},
-                          {"light", MotionKind::light}},
-                         "how the light moves")
+  verb.add_option_function<std::string>(
+          "--motion",
+          [&c](const std::string& text) {
+            check_choice(text);
+            c.recording.clear();
+            if (const auto kind = motion_from_name(text)) {
+              c.sequence.motion.kind = *kind;
+            } else {
+              c.recording = text;
+            }
+          },
+          "how the light moves: still, rotate, tumble, swing, blend, light, or as recorded by "
+          "haarlight-view, with that recording's methods and budgets [rotate]")
+      ->type_name("NAME|FILE.json")
       ->group("Motion");
   add_number(verb, "--degrees", s.motion.degrees, -kMaxDegrees, kMaxDegrees,
              "size of the motion, degrees")
@@ -235,11 +285,17 @@ Verb add_relight(CLI::App& verb) {
       ->group("Output");
   add_threads(verb)->group("Output");
 
+  for (const char* name : {"--degrees", "--frames", "--stop", "--method", "--wavelets", "--weight",
+                           "--bands", "--from-dark"}) {
+    c.said_by_recording.push_back(verb.get_option(name));
+  }
+
   verb.footer(
       "\nMotions, t = min(frame, stop) / stop, D = --degrees: still; rotate: about +Y by D t^2;\n"
       "tumble: about +Y by 2 D t, then about +X by 1.6 D t^2; swing: about +Y by 0.4 D sin(4 pi "
       "t);\n"
       "blend: (1 - t) A + t B; light: a disc light carried once round over 2 % of A.\n"
+      "A recording (FILE.json) says light, method, budget and weight of every frame itself.\n"
       "Metrics: frame, method, wavelets, weight, updates, resets (a digit a band, coarsest "
       "first),\n"
       "lighting_error (area-weighted L1, relative), image_rel_rmse and image_max_abs (against the\n"

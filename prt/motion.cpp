@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "prt/disc_light.h"
 
 namespace haarlight {
 namespace {
@@ -36,42 +37,6 @@ int effective_frame(const MotionOptions& options, int frame) {
 
 double time_of(const MotionOptions& options, int frame) {
   return static_cast<double>(effective_frame(options, frame)) / options.stop;
-}
-
-/// Share of a texel's solid angle under the disc, by samples in a square grid.
-double disc_share(const Vec3& center, int face, int x, int y, int n) {
-  // Enough samples for coarse faces too: 512 along a face.
-  const int samples = std::max(8, 512 / n);
-  double inside = 0, all = 0;
-  for (int j = 0; j < samples; ++j) {
-    for (int i = 0; i < samples; ++i) {
-      const double u = 2 * (x + (i + 0.5) / samples) / n - 1;
-      const double v = 2 * (y + (j + 0.5) / samples) / n - 1;
-      const double s = 1 + u * u + v * v, solid_angle = 1 / (s * std::sqrt(s));
-      all += solid_angle;
-      if (dot(cube_direction({face, u, v}), center) >= kDiscCosine) inside += solid_angle;
-    }
-  }
-  return inside / all;
-}
-
-void add_disc(const Vec3& center, Cubemap& map) {
-  const double radius = std::acos(kDiscCosine);
-  // No point of a texel is farther from its middle than this: half a diagonal of length
-  // sqrt(2) 2 / n, which projecting onto the sphere only shortens.
-  const double reach = std::sqrt(2.0) / map.n;
-  for (int face = 0; face < 6; ++face) {
-    for (int y = 0; y < map.n; ++y) {
-      for (int x = 0; x < map.n; ++x) {
-        const double cosine = dot(cube_texel_center(face, x, y, map.n), center);
-        const double angle = std::acos(std::clamp(cosine, -1.0, 1.0));
-        if (angle > radius + reach) continue;
-        const double share = angle < radius - reach ? 1.0 : disc_share(center, face, x, y, map.n);
-        const auto light = static_cast<float>(kDiscRadiance * share);
-        map.texels[cube_index(face, x, y, map.n)] += Rgb(light, light, light);
-      }
-    }
-  }
 }
 
 void check(const MotionOptions& options) {
@@ -171,7 +136,8 @@ const Cubemap& Motion::cubemap(int frame) {
     case MotionKind::light:
       std::transform(start_.texels.begin(), start_.texels.end(), current_.texels.begin(),
                      [](const Rgb& a) { return static_cast<float>(kDiscBackgroundShare) * a; });
-      add_disc(motion_disc_center(options_, wanted), current_);
+      add_disc_light(motion_disc_center(options_, wanted), kDiscCosine,
+                     Rgb(kDiscRadiance, kDiscRadiance, kDiscRadiance), current_);
       break;
   }
   frame_ = wanted;

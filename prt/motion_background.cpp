@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/error.h"
 #include "core/parallel.h"
@@ -17,14 +18,19 @@ constexpr int kDiscSamples = 4;  // on an axis of a pixel, for a smooth rim
 
 /// composite_environment of `environment` times `factor`. What that adds is linear in radiance, so
 /// that lights can be drawn one after the other.
-void add_environment(const Transport& transport, const Environment& environment, double factor,
-                     Image& picture) {
+void add_environment(const Transport& transport, const Environment& environment,
+                     const Rotation& rotation, double factor, Image& picture) {
   if (factor <= 0) return;
+  if (factor == 1) {
+    composite_environment(transport, environment, rotation, picture);
+    return;
+  }
   const EnvironmentOptions options{.projection = environment.projection(), .scale = factor};
-  composite_environment(transport, Environment(environment.picture(), options), {}, picture);
+  composite_environment(transport, Environment(environment.picture(), options), rotation, picture);
 }
 
-void add_disc(const Transport& transport, const Vec3& center, Image& picture) {
+void add_disc(const Transport& transport, const Vec3& center, double cosine, const Rgb& radiance,
+              Image& picture) {
   const Camera& camera = transport.info().camera;
   parallel_for(picture.height, [&](int y) {
     for (int x = 0; x < picture.width; ++x) {
@@ -33,15 +39,22 @@ void add_disc(const Transport& transport, const Vec3& center, Image& picture) {
         for (int i = 0; i < kDiscSamples; ++i) {
           const Vec3 direction =
               camera.direction(x + (i + 0.5) / kDiscSamples, y + (j + 0.5) / kDiscSamples);
-          inside += dot(direction, center) >= kDiscCosine;
+          inside += dot(direction, center) >= cosine;
         }
       }
       const double share = static_cast<double>(inside) / (kDiscSamples * kDiscSamples);
       const float uncovered = 1 - transport.coverage()[picture.index(x, y)];
-      const float light = static_cast<float>(kDiscRadiance * share) * uncovered;
-      picture.at(x, y) += Rgb(light, light, light);
+      picture.at(x, y) += Rgb(RgbD(radiance) * share) * uncovered;
     }
   });
+}
+
+void check_size(const Transport& transport, const Image& picture) {
+  if (picture.width != transport.width() || picture.height != transport.height()) {
+    throw Error(ErrorKind::invalid_argument,
+                fmt::format("picture is {}x{}, expected {}x{} as the transport", picture.width,
+                            picture.height, transport.width(), transport.height()));
+  }
 }
 
 }  // namespace
@@ -49,11 +62,7 @@ void add_disc(const Transport& transport, const Vec3& center, Image& picture) {
 void composite_motion_background(const Transport& transport, const MotionOptions& options,
                                  int frame, const Environment& from, const Environment* to,
                                  Image& picture) {
-  if (picture.width != transport.width() || picture.height != transport.height()) {
-    throw Error(ErrorKind::invalid_argument,
-                fmt::format("picture is {}x{}, expected {}x{} as the transport", picture.width,
-                            picture.height, transport.width(), transport.height()));
-  }
+  check_size(transport, picture);
   switch (options.kind) {
     case MotionKind::blend: {
       if (to == nullptr) {
@@ -61,13 +70,14 @@ void composite_motion_background(const Transport& transport, const MotionOptions
                     "blend has one environment, expected a second one to blend to");
       }
       const double t = static_cast<double>(std::min(frame, options.stop)) / options.stop;
-      add_environment(transport, from, 1 - t, picture);
-      add_environment(transport, *to, t, picture);
+      add_environment(transport, from, {}, 1 - t, picture);
+      add_environment(transport, *to, {}, t, picture);
       break;
     }
     case MotionKind::light:
-      add_environment(transport, from, kDiscBackgroundShare, picture);
-      add_disc(transport, motion_disc_center(options, frame), picture);
+      add_environment(transport, from, {}, kDiscBackgroundShare, picture);
+      add_disc(transport, motion_disc_center(options, frame), kDiscCosine,
+               Rgb(kDiscRadiance, kDiscRadiance, kDiscRadiance), picture);
       break;
     case MotionKind::still:
     case MotionKind::rotate:
@@ -75,6 +85,22 @@ void composite_motion_background(const Transport& transport, const MotionOptions
     case MotionKind::swing:
       composite_environment(transport, from, motion_rotation(options, frame), picture);
       break;
+  }
+}
+
+void composite_light_background(const Transport& transport, const LightState& state,
+                                std::span<const Environment> environments, Image& picture) {
+  check_size(transport, picture);
+  check_light_state(state, environments.size());
+  const auto draw = [&](int index, double factor) {
+    if (factor <= 0) return;
+    add_environment(transport, environments[static_cast<std::size_t>(index)], state.rotation,
+                    factor, picture);
+  };
+  draw(state.from, (1 - state.blend) * state.background);
+  draw(state.to, state.blend * state.background);
+  for (const DiscLight& disc : state.discs) {
+    add_disc(transport, disc.direction, std::cos(disc.half_angle), disc.radiance, picture);
   }
 }
 

@@ -2,7 +2,10 @@
 
 #pragma once
 
+#include <span>
+
 #include "core/image.h"
+#include "prt/light_rig.h"
 #include "prt/motion.h"
 #include "prt/transport.h"
 #include "wavelet/environment.h"
@@ -16,5 +19,9 @@ namespace haarlight {
 void composite_motion_background(const Transport& transport, const MotionOptions& options,
                                  int frame, const Environment& from, const Environment* to,
                                  Image& picture);
+
+/// The same for a state of light among `environments`. Throws as check_light_state does.
+void composite_light_background(const Transport& transport, const LightState& state,
+                                std::span<const Environment> environments, Image& picture);
 
 }  // namespace haarlight

@@ -1,0 +1,83 @@
+// One frame: decide which wavelets change, apply them, measure. Beside it, on demand, the same
+// frame under the exact lighting.
+
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "core/image.h"
+#include "prt/image_relighter.h"
+#include "prt/lighting_tracker.h"
+#include "prt/transport.h"
+#include "prt/wavelet_weight.h"
+
+namespace haarlight {
+
+/// What a frame did and how long it took: a row of the metrics file.
+struct FrameMetrics {
+  int frame = 0;
+  LightingMethod method = LightingMethod::pbi;
+  int wavelets = 0;  ///< budget of an update; all coefficients for the reference method
+  WaveletWeight weight = WaveletWeight::area;
+  int updates = 0;            ///< wavelets changed
+  std::string resets;         ///< one digit a band, coarsest first; 1: the band was reset
+  double lighting_error = 0;  ///< lighting_error() of what is shown against the target
+  /// Over the pixels of the scene, against the picture under the exact lighting: relative RMSE and
+  /// the largest difference in any channel (W m^-2 sr^-1). Only with against_reference.
+  std::optional<double> image_rel_rmse, image_max_abs;
+  double update_ms = 0;     ///< deciding the update
+  double apply_ms = 0;      ///< streaming columns into sums
+  double finish_ms = 0;     ///< sums to pixels
+  double total_ms = 0;      ///< wall time from the target's coefficients to the picture
+  std::uint64_t bytes = 0;  ///< of transport and of sums moved
+};
+
+/// How a frame goes about its target.
+enum class FrameStart {
+  advance,  ///< from what is shown, by the method
+  exact,    ///< show the target in full, whatever the method (Overbeck 2006, section 3)
+  dark,     ///< forget what is shown, then advance
+};
+
+/// picture() == T * tracker().shown() after every frame.
+class FrameRelighter {
+ public:
+  /// `lighting.weights` are ignored: `weight` says which.
+  FrameRelighter(const Transport& transport, LightingOptions lighting, WaveletWeight weight);
+
+  /// From the next frame on. Cheap when nothing changed. Throws as LightingTracker::set_options.
+  void set_options(const LightingOptions& lighting, WaveletWeight weight);
+  /// Whether frames are also relit exactly. The first such frame after a pause costs a full one.
+  void compare_with_reference(bool compare);
+
+  /// Relights towards `target`, layout.size() coefficients, valid until the next call; the frame's
+  /// number is the caller's. Throws as LightingTracker::advance, and then changes nothing.
+  const FrameMetrics& relight(std::span<const Rgb> target, FrameStart start, int frame);
+
+  const Image& picture() const { return relighter_.picture(); }
+  /// The same under the exact lighting; null unless asked for.
+  const Image* reference() const;
+  const LightingTracker& tracker() const { return tracker_; }
+  const LightingUpdate& update() const { return *update_; }
+  const Transport& transport() const { return relighter_.transport(); }
+
+ private:
+  void go_dark();
+
+  LightingTracker tracker_;
+  WaveletWeight weight_;
+  ImageRelighter relighter_;
+  struct Exact {
+    LightingTracker tracker;
+    ImageRelighter relighter;
+  };
+  std::optional<Exact> exact_;
+  bool compare_ = false;
+  const LightingUpdate* update_ = nullptr;
+  FrameMetrics metrics_;
+};
+
+}  // namespace haarlight
