@@ -1,0 +1,41 @@
+// The tiles of a picture as a source for the driver.
+
+#include "precompute/picture_tiles.h"
+
+#include <vector>
+
+namespace haarlight {
+namespace {
+
+class PictureWorker : public TileSource::Worker {
+ public:
+  PictureWorker(const TileTracer& tracer, int width) : tracer_(tracer), width_(width) {}
+
+  void trace(std::span<const std::uint32_t> outputs, TileRows& rows) override {
+    tracer_.trace(outputs, scratch_, rows, counts);
+  }
+
+  bool shows_scene(std::span<const std::uint32_t> outputs) override {
+    for (const std::size_t row : {0u, 21u, 42u, 63u}) {  // one a block
+      if (outputs[row] == kNoOutput) continue;
+      const int pixel = static_cast<int>(outputs[row]);
+      tracer_.pixels().sample(pixel % width_, pixel / width_, points_, counts);
+      if (!points_.empty()) return true;
+    }
+    return false;
+  }
+
+ private:
+  const TileTracer& tracer_;
+  int width_;
+  TileTracer::Scratch scratch_;
+  std::vector<PixelPoint> points_;
+};
+
+}  // namespace
+
+std::unique_ptr<TileSource::Worker> PictureTiles::make_worker() const {
+  return std::make_unique<PictureWorker>(tracer_, width_);
+}
+
+}  // namespace haarlight

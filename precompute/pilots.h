@@ -1,0 +1,27 @@
+// A few tiles traced before the rest, to learn how much may be dropped.
+
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "precompute/tile_source.h"
+
+namespace haarlight {
+
+inline constexpr int kPilotTiles = 64;
+
+/// Numbers of up to kPilotTiles tiles spread evenly over those that show the scene. `order` is the
+/// row order of all tiles.
+std::vector<int> choose_pilots(TileSource::Worker& worker, std::span<const std::uint32_t> order);
+
+/// Traces the pilots, a thread a tile, and hands their rows to `take`, in order. `done` is told of
+/// finished tiles. Returns the rays traced.
+RayCounts trace_pilots(const TileSource& source, std::span<const std::uint32_t> order,
+                       std::span<const int> pilots, int threads,
+                       const std::function<void(const TileRows&)>& take,
+                       const std::function<void(int count)>& done);
+
+}  // namespace haarlight

@@ -1,0 +1,25 @@
+// What a transport file says of the scene it was made from.
+
+#include "precompute/scene_meta.h"
+
+#include <nlohmann/json.hpp>
+
+namespace haarlight {
+
+nlohmann::json scene_meta(const Scene& scene) {
+  const SceneReport& r = scene.report;
+  return {{"name", scene.name},
+          {"triangles", scene.triangle.size()},
+          {"materials", scene.material.size()},
+          {"dropped_degenerate", r.dropped_degenerate},
+          {"dropped_not_finite", r.dropped_not_finite},
+          {"dropped_duplicate", r.dropped_duplicate},
+          {"dropped_not_triangle", r.dropped_not_triangle},
+          {"normals_made", r.normals_made},
+          {"unused_vertices", r.unused_vertices},
+          {"textures_missing", r.textures_missing},
+          {"blended_materials", r.blended_materials},
+          {"rough_glass", r.rough_glass}};
+}
+
+}  // namespace haarlight

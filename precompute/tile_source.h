@@ -1,0 +1,38 @@
+// What the driver knows of a tracer: it makes the rows of tiles.
+
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "precompute/point_tracer.h"
+#include "prt/transport_writer.h"
+#include "wavelet/haar.h"
+
+namespace haarlight {
+
+/// Makes the rows of a transport, tile by tile: of a picture's pixels, of a mesh's vertices. What a
+/// tile's rows are depends on its outputs alone, never on thread, order or other tiles.
+class TileSource {
+ public:
+  /// Working memory of one thread, and what it did.
+  class Worker {
+   public:
+    virtual ~Worker() = default;
+    /// Rows of `outputs` (kTileRows entries of the row order, kNoOutput: an empty row), replacing
+    /// what `rows` holds.
+    virtual void trace(std::span<const std::uint32_t> outputs, TileRows& rows) = 0;
+    /// Whether the scene is seen in any of `outputs`; cheap.
+    virtual bool shows_scene(std::span<const std::uint32_t> outputs) = 0;
+
+    RayCounts counts;
+    double transform_seconds = 0;  ///< part of trace(): the wavelet transform
+  };
+
+  virtual ~TileSource() = default;
+  virtual const HaarLayout& layout() const = 0;
+  virtual std::unique_ptr<Worker> make_worker() const = 0;
+};
+
+}  // namespace haarlight
