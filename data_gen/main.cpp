@@ -90,10 +90,10 @@ void write_environment(const std::string& name, std::uint64_t seed, const std::s
 void list() {
   fmt::print("scenes (haarlight-data scene NAME -o FILE.glb):\n");
   for (const SceneEntry& entry : scenes())
-    fmt::print("  {:<10} {}\n", entry.name, entry.description);
+    fmt::print("  {:<12} {}\n", entry.name, entry.description);
   fmt::print("\nenvironments (haarlight-data environment NAME -o FILE.exr):\n");
   for (const EnvironmentEntry& entry : environments()) {
-    fmt::print("  {:<10} {}\n", entry.name, entry.description);
+    fmt::print("  {:<12} {}\n", entry.name, entry.description);
   }
 }
 

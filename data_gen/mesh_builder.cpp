@@ -20,14 +20,25 @@ std::uint32_t MeshBuilder::add_material(const std::string& name, const Rgb& albe
   material.albedo = albedo;
   material.specular = specular;
   material.exponent = exponent;
-  scene_.material.push_back(std::move(material));
+  return add_material(material);
+}
+
+std::uint32_t MeshBuilder::add_material(const Material& material) {
+  scene_.material.push_back(material);
   return static_cast<std::uint32_t>(scene_.material.size() - 1);
 }
 
-std::uint32_t MeshBuilder::add_vertex(const Vec3& position, const Vec3& normal) {
+int MeshBuilder::add_texture(const Image& picture, const std::vector<float>& alpha) {
+  scene_.texture.push_back(picture);
+  scene_.alpha.push_back(alpha);
+  return static_cast<int>(scene_.texture.size()) - 1;
+}
+
+std::uint32_t MeshBuilder::add_vertex(const Vec3& position, const Vec3& normal,
+                                      const std::array<float, 2>& uv) {
   scene_.position.push_back(position);
   scene_.normal.push_back(normal);
-  scene_.uv.push_back({0, 0});
+  scene_.uv.push_back(uv);
   return static_cast<std::uint32_t>(scene_.position.size() - 1);
 }
 
@@ -91,12 +102,18 @@ void MeshBuilder::add_grid(std::uint32_t material, int columns, int rows,
 }
 
 void MeshBuilder::add_quad(std::uint32_t material, const Vec3& a, const Vec3& b, const Vec3& c,
-                           const Vec3& d) {
+                           const Vec3& d, const std::array<float, 2>& repeats) {
   const Vec3 normal = normalize(cross(b - a, d - a));
-  const std::uint32_t ia = add_vertex(a, normal), ib = add_vertex(b, normal),
-                      ic = add_vertex(c, normal), id = add_vertex(d, normal);
+  const std::uint32_t ia = add_vertex(a, normal), ib = add_vertex(b, normal, {repeats[0], 0}),
+                      ic = add_vertex(c, normal, repeats),
+                      id = add_vertex(d, normal, {0, repeats[1]});
   scene_.triangle.push_back({{ia, ib, ic}, material});
   scene_.triangle.push_back({{ia, ic, id}, material});
+}
+
+void MeshBuilder::add_ground(std::uint32_t material, double half, float repeats) {
+  add_quad(material, {-half, 0, half}, {half, 0, half}, {half, 0, -half}, {-half, 0, -half},
+           {repeats, repeats});
 }
 
 void MeshBuilder::add_box(std::uint32_t material, const Vec3& base, const Vec3& size,

@@ -7,6 +7,7 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "precompute/scene.h"
 
@@ -23,6 +24,9 @@ class MeshBuilder {
   /// Returns the material's index, which the calls below take.
   std::uint32_t add_material(const std::string& name, const Rgb& albedo, const Rgb& specular = {},
                              float exponent = 32);
+  std::uint32_t add_material(const Material& material);
+  /// A picture for Material::texture; `alpha` is empty or one a pixel.
+  int add_texture(const Image& picture, const std::vector<float>& alpha = {});
 
   /// A surface of columns x rows quads over (s, t) in [0, 1]^2, smooth normals from its own
   /// triangles. The outside is where d/ds x d/dt points; `close_s` joins s = 1 to s = 0 in the
@@ -30,8 +34,12 @@ class MeshBuilder {
   void add_grid(std::uint32_t material, int columns, int rows,
                 const std::function<Vec3(double s, double t)>& surface, bool close_s = false);
 
-  /// Flat quad a, b, c, d, counter-clockwise from outside.
-  void add_quad(std::uint32_t material, const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d);
+  /// Flat quad a, b, c, d, counter-clockwise from outside. A texture is repeated so often from a to
+  /// b (its u) and from b to c (its v).
+  void add_quad(std::uint32_t material, const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d,
+                const std::array<float, 2>& repeats = {0, 0});
+  /// Square on y = 0 from -half to half.
+  void add_ground(std::uint32_t material, double half, float repeats = 0);
   /// Axis-aligned box turned about +Y by `radians` around the middle of its bottom, `base`.
   void add_box(std::uint32_t material, const Vec3& base, const Vec3& size, double radians = 0);
   /// Ellipsoid with the given half axes, `segments` around and half as many from pole to pole.
@@ -49,7 +57,8 @@ class MeshBuilder {
   Scene finish(const Camera& camera);
 
  private:
-  std::uint32_t add_vertex(const Vec3& position, const Vec3& normal);
+  std::uint32_t add_vertex(const Vec3& position, const Vec3& normal,
+                           const std::array<float, 2>& uv = {0, 0});
   Scene scene_;
 };
 

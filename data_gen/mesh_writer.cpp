@@ -17,6 +17,8 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "data_gen/gltf_material.h"
+#include "data_gen/png.h"
 
 namespace haarlight::data_gen {
 namespace {
@@ -56,22 +58,6 @@ std::array<float, 3> floats(const Vec3& v) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
 }
 
-std::vector<double> numbers(const Rgb& c, bool with_alpha) {
-  std::vector<double> out{c.r, c.g, c.b};
-  if (with_alpha) out.push_back(1.0);
-  return out;
-}
-
-nlohmann::json gltf_material(const Material& material) {
-  const bool lobe = luminance(material.specular) > 0;
-  const bool metal = lobe && luminance(material.specular) > luminance(material.albedo);
-  nlohmann::json pbr;
-  pbr["baseColorFactor"] = numbers(metal ? material.specular : material.albedo, true);
-  pbr["metallicFactor"] = metal ? 1.0 : 0.0;
-  pbr["roughnessFactor"] = lobe ? std::pow(2.0 / (material.exponent + 2.0), 0.25) : 1.0;
-  return {{"name", material.name}, {"pbrMetallicRoughness", pbr}};
-}
-
 // glTF wants a node matrix column by column.
 std::vector<double> gltf_matrix(const Camera& camera) {
   const Rotation columns = camera.orientation.transposed();
@@ -95,6 +81,13 @@ class GltfBuffer {
     std::memcpy(bytes_.data() + begin, values.data(), bytes);
     return views.size() - 1;
   }
+  // A file inside the file; what comes after stays on a multiple of four bytes.
+  std::size_t add_file(const std::string& content, nlohmann::json& views) {
+    views.push_back({{"buffer", 0}, {"byteOffset", bytes_.size()}, {"byteLength", content.size()}});
+    bytes_.insert(bytes_.end(), content.begin(), content.end());
+    bytes_.resize((bytes_.size() + 3) / 4 * 4, 0);
+    return views.size() - 1;
+  }
   std::vector<char>& bytes() { return bytes_; }
 
  private:
@@ -103,13 +96,21 @@ class GltfBuffer {
 
 constexpr int kFloat = 5126, kUnsignedInt = 5125, kVertices = 34962, kIndices = 34963;
 
+bool has_texture(const Material& m) {
+  return m.texture >= 0 || m.metallic_roughness_texture >= 0 || m.normal_texture >= 0;
+}
+
 void write_glb(const std::filesystem::path& file, const Scene& scene) {
   using nlohmann::json;
   json gltf;
   gltf["asset"] = {{"version", "2.0"}, {"generator", "haarlight-data"}};
   json materials = json::array(), primitives = json::array(), views = json::array(),
        accessors = json::array();
-  for (const Material& material : scene.material) materials.push_back(gltf_material(material));
+  GltfTextures textures;
+  std::vector<std::string> extensions;
+  for (const Material& material : scene.material) {
+    materials.push_back(gltf_material(material, textures, extensions));
+  }
 
   GltfBuffer buffer;
   const auto add_vectors = [&](const Part& part, const std::vector<Vec3>& all, bool bounds) {
@@ -135,11 +136,23 @@ void write_glb(const std::filesystem::path& file, const Scene& scene) {
   for (const Part& part : split_by_material(scene)) {
     const std::size_t position = add_vectors(part, scene.position, true);
     const std::size_t normal = add_vectors(part, scene.normal, false);
+    json attributes{{"POSITION", position}, {"NORMAL", normal}};
+    if (has_texture(scene.material[part.material])) {
+      std::vector<std::array<float, 2>> values;
+      for (const std::uint32_t v : part.vertex) {
+        values.push_back({scene.uv[v][0], 1 - scene.uv[v][1]});  // v runs down
+      }
+      accessors.push_back({{"componentType", kFloat},
+                           {"count", values.size()},
+                           {"type", "VEC2"},
+                           {"bufferView", buffer.add(values, kVertices, views)}});
+      attributes["TEXCOORD_0"] = accessors.size() - 1;
+    }
     accessors.push_back({{"componentType", kUnsignedInt},
                          {"count", part.index.size()},
                          {"type", "SCALAR"},
                          {"bufferView", buffer.add(part.index, kIndices, views)}});
-    primitives.push_back({{"attributes", {{"POSITION", position}, {"NORMAL", normal}}},
+    primitives.push_back({{"attributes", attributes},
                           {"indices", accessors.size() - 1},
                           {"material", part.material}});
   }
@@ -164,6 +177,22 @@ void write_glb(const std::filesystem::path& file, const Scene& scene) {
   gltf["nodes"] = nodes;
   gltf["meshes"] = json::array({{{"primitives", primitives}}});
   gltf["materials"] = materials;
+  if (!textures.wanted().empty()) {
+    json images = json::array(), list = json::array();
+    for (const auto& [texture, srgb] : textures.wanted()) {
+      const auto t = static_cast<std::size_t>(texture);
+      const std::string png = encode_png(
+          scene.texture[t], t < scene.alpha.size() ? scene.alpha[t] : std::vector<float>(), srgb);
+      list.push_back({{"source", images.size()}, {"sampler", 0}});
+      images.push_back({{"mimeType", "image/png"}, {"bufferView", buffer.add_file(png, views)}});
+    }
+    gltf["images"] = images;
+    gltf["textures"] = list;
+    constexpr int kLinear = 9729, kRepeat = 10497;
+    gltf["samplers"] = json::array(
+        {{{"magFilter", kLinear}, {"minFilter", kLinear}, {"wrapS", kRepeat}, {"wrapT", kRepeat}}});
+  }
+  if (!extensions.empty()) gltf["extensionsUsed"] = extensions;
   gltf["accessors"] = accessors;
   gltf["bufferViews"] = views;
   gltf["buffers"] = json::array({{{"byteLength", buffer.bytes().size()}}});
@@ -198,6 +227,31 @@ std::string obj_name(const Material& material, std::size_t index) {
   return name;
 }
 
+// illum: 1 matt, 2 with a lobe, 3 mirror, 7 glass; Pm and Pr as common extensions have them.
+std::string obj_material(const Material& m, const std::string& name) {
+  const auto color = [](const char* key, const Rgb& c) {
+    return fmt::format("{} {} {} {}\n", key, c.r, c.g, c.b);
+  };
+  std::string mtl = fmt::format("newmtl {}\n", name);
+  switch (m.model) {
+    case SurfaceModel::phong: {
+      const bool lobe = luminance(m.specular) > 0;
+      mtl += color("Kd", m.albedo) + color("Ks", m.specular);
+      if (lobe) mtl += fmt::format("Ns {}\n", m.exponent);
+      return mtl + (lobe ? "illum 2\n\n" : "illum 1\n\n");
+    }
+    case SurfaceModel::metallic_roughness:
+      return mtl + color("Kd", m.albedo) +
+             fmt::format("Pm {}\nPr {}\nNi {}\nillum 2\n\n", m.metallic, m.roughness, m.ior);
+    case SurfaceModel::mirror:
+      return mtl + color("Kd", {}) + color("Ks", m.albedo) + "illum 3\n\n";
+    case SurfaceModel::glass:
+      return mtl + color("Kd", {}) + color("Tf", m.albedo) +
+             fmt::format("Ni {}\nillum 7\n\n", m.ior);
+  }
+  return mtl;
+}
+
 void write_text(const std::filesystem::path& file, const std::string& text) {
   AtomicFile out(file);
   out.write(text.data(), text.size());
@@ -210,12 +264,7 @@ void write_obj(const std::filesystem::path& file, const Scene& scene) {
 
   std::string mtl = "# haarlight-data\n";
   for (std::size_t i = 0; i < scene.material.size(); ++i) {
-    const Material& m = scene.material[i];
-    const bool lobe = luminance(m.specular) > 0;
-    mtl += fmt::format("newmtl {}\nKd {} {} {}\nKs {} {} {}\n", obj_name(m, i), m.albedo.r,
-                       m.albedo.g, m.albedo.b, m.specular.r, m.specular.g, m.specular.b);
-    if (lobe) mtl += fmt::format("Ns {}\n", m.exponent);
-    mtl += lobe ? "illum 2\n\n" : "illum 1\n\n";
+    mtl += obj_material(scene.material[i], obj_name(scene.material[i], i));
   }
 
   std::string obj = fmt::format("# haarlight-data\nmtllib {}\n", library.filename().string());

@@ -12,6 +12,11 @@ namespace haarlight::data_gen {
 /// the same stem; OBJ has no cameras). Positions and normals become 32-bit floats, and only
 /// vertices that a triangle uses are written, material by material.
 ///
+/// Metallic-roughness materials, mirrors (metallic, roughness 0) and glass
+/// (KHR_materials_transmission, _ior and, unless thin, _volume with the extinction) are whole in
+/// glTF, with textures as 8-bit PNG in the file and alpha_cutoff as a mask. OBJ has Pm and Pr,
+/// illum 3 with Ks, illum 7 with Ni and Tf; no textures, no holes, no extinction.
+///
 /// A Phong lobe is stated as each format can: Ks and Ns in OBJ; in glTF roughness
 /// (2 / (e + 2))^(1/4), with metallic 1 where the specular colour outweighs the albedo. A material
 /// without a lobe has metallic 0 and roughness 1.

@@ -1,4 +1,4 @@
-// The list of scenes, and the two simple ones.
+// The list of scenes, and the simple ones.
 
 #include "data_gen/scenes.h"
 
@@ -16,12 +16,14 @@ constexpr std::array kScenes{
     SceneEntry{"plant", "a potted plant with hundreds of curved leaves by a low wall", make_plant},
     SceneEntry{"pillars", "columns and spheres on a ground", make_pillars},
     SceneEntry{"spheres", "spheres over a ground", make_spheres},
+    SceneEntry{"ring", "a shiny ring on a matt ground: its caustic", make_ring},
+    SceneEntry{"glass", "glass bodies and a mirror on a checkered floor", make_glass},
+    SceneEntry{"cornell", "a box with a red and a green wall, open in front", make_cornell},
+    SceneEntry{"cornell-dark", "the same with black walls: nothing bounces", make_cornell_dark},
+    SceneEntry{"metals", "balls of gold, copper and plastic, smooth to rough", make_metals},
+    SceneEntry{"room", "a furnished room, lit through its window only", make_room},
+    SceneEntry{"convex", "one convex body in the open: nothing but its own horizon", make_convex},
 };
-
-void add_ground(MeshBuilder& builder, std::uint32_t material, double half) {
-  builder.add_quad(material, {-half, 0, half}, {half, 0, half}, {half, 0, -half},
-                   {-half, 0, -half});
-}
 
 }  // namespace
 
@@ -44,7 +46,7 @@ Scene make_pillars(std::uint64_t seed) {
   const auto stone = builder.add_material("stone", {0.55f, 0.53f, 0.50f});
   const auto red = builder.add_material("red", {0.55f, 0.10f, 0.07f});
   const auto blue = builder.add_material("blue", {0.09f, 0.17f, 0.45f});
-  add_ground(builder, ground, 8);
+  builder.add_ground(ground, 8);
   // Two rows of five columns, each with a square foot and head.
   for (int i = 0; i < 5; ++i) {
     for (const double z : {-1.0, 1.0}) {
@@ -72,7 +74,7 @@ Scene make_spheres(std::uint64_t seed) {
   const std::array materials{builder.add_material("clay", {0.55f, 0.30f, 0.20f}),
                              builder.add_material("chalk", {0.75f, 0.74f, 0.70f}),
                              builder.add_material("moss", {0.22f, 0.35f, 0.14f})};
-  add_ground(builder, ground, 6);
+  builder.add_ground(ground, 6);
   for (int i = 0; i < 9; ++i) {
     const double radius = random.between(0.18, 0.42);
     const Vec3 center{(i % 3 - 1) * 1.2 + random.between(-0.2, 0.2),
@@ -82,6 +84,15 @@ Scene make_spheres(std::uint64_t seed) {
                           {radius, radius, radius}, 64);
   }
   return builder.finish(look_at({1.8, 2.6, 5.0}, {0, 0.35, 0}, 0.61, 512, 512));
+}
+
+Scene make_convex(std::uint64_t seed) {
+  Random random(seed);
+  MeshBuilder builder;
+  const auto clay = builder.add_material("clay", {0.70f, 0.42f, 0.28f});
+  builder.add_ellipsoid(clay, {0, 0.6, 0},
+                        {random.between(0.7, 0.8), 0.6, random.between(0.5, 0.6)}, 64);
+  return builder.finish(look_at({1.2, 1.5, 3.2}, {0, 0.6, 0}, 0.5, 512, 512));
 }
 
 }  // namespace haarlight::data_gen

@@ -14,12 +14,16 @@
 #include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "core/error.h"
+#include "core/image_io.h"
 #include "data_gen/mesh_writer.h"
+#include "data_gen/png.h"
+#include "tests/reference/triangle_tree.h"
 
 namespace haarlight::data_gen {
 namespace {
@@ -96,9 +100,11 @@ TEST(Scenes, MeshesAreSound) {
       for (const auto v : t.vertex) ASSERT_GT(dot(flat, scene.normal[v]), -0.2) << entry.name;
     }
     for (const Material& m : scene.material) {
+      // Matt things as bright as things are; a texture's colours are in it.
+      const bool matt = m.model == SurfaceModel::phong && m.texture < 0;
       for (const float channel : {m.albedo.r, m.albedo.g, m.albedo.b}) {
-        EXPECT_GT(channel, 0) << entry.name << " " << m.name;
-        EXPECT_LT(channel, 0.9f) << entry.name << " " << m.name;
+        EXPECT_GE(channel, m.name == "black" ? 0.0f : 1e-3f) << entry.name << " " << m.name;
+        EXPECT_LT(channel, matt ? 0.9f : 1.001f) << entry.name << " " << m.name;
       }
     }
   }
@@ -109,6 +115,78 @@ TEST(Scenes, PlantIsIntricateButAffordable) {
   EXPECT_GT(plant.triangle.size(), 20000u);
   EXPECT_LT(plant.triangle.size(), 100000u);
   EXPECT_GT(plant.material.size(), 8u);
+}
+
+TEST(Scenes, OnlyPlantAndSpheresAreLarge) {
+  for (const SceneEntry& entry : scenes()) {
+    if (entry.name != "plant" && entry.name != "spheres") {
+      EXPECT_LE(entry.make(1).triangle.size(), 30'000u) << entry.name;
+    }
+  }
+}
+
+// How often a material's triangles walk each edge one way and the other: once each if it bounds a
+// body.
+bool is_closed(const Scene& scene, const std::string& material) {
+  using Corner = std::array<double, 3>;
+  std::map<std::pair<Corner, Corner>, int> walked;
+  for (const Triangle& t : scene.triangle) {
+    if (scene.material[t.material].name != material) continue;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3 &a = scene.position[t.vertex[k]], &b = scene.position[t.vertex[(k + 1) % 3]];
+      ++walked[{{a.x, a.y, a.z}, {b.x, b.y, b.z}}];
+    }
+  }
+  for (const auto& [edge, times] : walked) {
+    const auto back = walked.find({edge.second, edge.first});
+    if (times != 1 || back == walked.end() || back->second != 1) return false;
+  }
+  return !walked.empty();
+}
+
+// Glass must know its inside, and metal must not show its own.
+TEST(Scenes, BodiesOfGlassAndMetalAreClosed) {
+  for (const char* body : {"crown glass", "slab", "green glass"}) {
+    EXPECT_TRUE(is_closed(make_scene("glass"), body)) << body;
+  }
+  EXPECT_TRUE(is_closed(make_scene("ring"), "gold"));
+  EXPECT_TRUE(is_closed(make_scene("metals"), "copper 3"));
+  EXPECT_TRUE(is_closed(make_scene("convex"), "clay"));
+  EXPECT_FALSE(is_closed(make_scene("cornell"), "red"));
+}
+
+TEST(Scenes, ConvexIsConvex) {
+  const Scene scene = make_scene("convex");
+  double highest = -1;
+  for (const Triangle& t : scene.triangle) {
+    const Vec3 a = scene.position[t.vertex[0]];
+    const Vec3 n =
+        normalize(cross(scene.position[t.vertex[1]] - a, scene.position[t.vertex[2]] - a));
+    for (const Vec3& p : scene.position) highest = std::max(highest, dot(n, p - a));
+  }
+  // No corner above any triangle's plane. An ellipsoid's quads are not flat: one of their diagonals
+  // lies inside by less than its height over the chord, 2 pi / 64 wide.
+  EXPECT_LT(highest, 1e-3);
+}
+
+// From nowhere in the room but through the window: every way out crosses the window's opening.
+TEST(Scenes, RoomIsLitThroughItsWindowOnly) {
+  const Scene scene = make_scene("room");
+  const reference::TriangleTree tree(scene);
+  std::mt19937 random(4);
+  std::normal_distribution<double> gauss;
+  int out = 0;
+  for (int i = 0; i < 40'000; ++i) {
+    const Vec3 from{0.3, 1.2, 0.9};
+    const Vec3 direction = normalize(Vec3{gauss(random), gauss(random), gauss(random)});
+    if (tree.hit(from, direction, true)) continue;
+    ++out;
+    const double distance = (-2.5 - from.x) / direction.x;
+    ASSERT_GT(distance, 0);
+    const Vec3 at = from + direction * distance;
+    EXPECT_TRUE(at.y > 0.85 && at.y < 2.25 && at.z > -1.0 && at.z < 0.7) << at.y << " " << at.z;
+  }
+  EXPECT_GT(out, 200);
 }
 
 TEST(Scenes, LeavesAreClosed) {
@@ -226,6 +304,116 @@ TEST(MeshWriter, GlbHoldsTheWholeScene) {
       const Rgb& albedo = scene.material[i].albedo;
       EXPECT_EQ((Rgb{color[0], color[1], color[2]}), albedo) << entry.name;
     }
+  }
+}
+
+TEST(MeshWriter, GlbSaysWhatMaterialsAre) {
+  const TemporaryFolder folder;
+  const auto written = [&](const Scene& scene) {
+    save_scene(folder / "scene.glb", scene);
+    return Glb(read_file(folder / "scene.glb"));
+  };
+  const auto named = [](const Glb& glb, const std::string& name) {
+    for (const auto& m : glb.json["materials"]) {
+      if (m["name"] == name) return m;
+    }
+    ADD_FAILURE() << name << " is not in the file";
+    return nlohmann::json();
+  };
+  const Glb metals = written(make_scene("metals"));
+  const auto copper = named(metals, "copper 2")["pbrMetallicRoughness"];
+  EXPECT_EQ(copper["metallicFactor"], 1.0);
+  EXPECT_EQ(copper["roughnessFactor"].get<float>(), 0.2f);
+  EXPECT_FALSE(metals.json.contains("extensionsUsed"));
+
+  const Glb glass = written(make_scene("glass"));
+  EXPECT_EQ(
+      glass.json["extensionsUsed"],
+      (nlohmann::json{"KHR_materials_transmission", "KHR_materials_ior", "KHR_materials_volume"}));
+  const auto crown = named(glass, "crown glass")["extensions"];
+  EXPECT_EQ(crown["KHR_materials_transmission"]["transmissionFactor"], 1.0);
+  EXPECT_EQ(crown["KHR_materials_ior"]["ior"].get<float>(), 1.52f);
+  EXPECT_GT(crown["KHR_materials_volume"]["thicknessFactor"].get<double>(), 0);
+  EXPECT_FALSE(crown["KHR_materials_volume"].contains("attenuationDistance"));
+  // What is left after x metres is color^(x / distance) = exp(-extinction x).
+  const auto green = named(glass, "green glass")["extensions"]["KHR_materials_volume"];
+  const double distance = green["attenuationDistance"];
+  const std::array extinction{3.5, 0.5, 2.2};
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double color = green["attenuationColor"][c];
+    EXPECT_GE(color, 0);
+    EXPECT_LE(color, 1);
+    EXPECT_NEAR(-std::log(color) / distance, extinction[c], 1e-6);
+  }
+  const auto mirror = named(glass, "mirror")["pbrMetallicRoughness"];
+  EXPECT_EQ(mirror["metallicFactor"], 1.0);
+  EXPECT_EQ(mirror["roughnessFactor"], 0.0);
+
+  Scene pane = make_spheres(1);
+  pane.material[1].model = SurfaceModel::glass;
+  pane.material[1].thin = true;
+  const auto thin = named(written(pane), pane.material[1].name)["extensions"];
+  EXPECT_TRUE(thin.contains("KHR_materials_transmission"));
+  EXPECT_FALSE(thin.contains("KHR_materials_volume"));
+}
+
+TEST(MeshWriter, GlbHoldsTextures) {
+  const TemporaryFolder folder;
+  Scene scene = make_scene("room");
+  save_scene(folder / "scene.glb", scene);
+  const Glb glb(read_file(folder / "scene.glb"));
+  std::size_t screen = 0;
+  while (scene.material[screen].name != "screen") ++screen;
+  const auto material = glb.json["materials"][screen];
+  EXPECT_EQ(material["alphaMode"], "MASK");
+  EXPECT_EQ(material["alphaCutoff"], 0.5);
+  const std::size_t texture = material["pbrMetallicRoughness"]["baseColorTexture"]["index"];
+  const std::size_t image = glb.json["textures"][texture]["source"];
+  EXPECT_EQ(glb.json["images"][image]["mimeType"], "image/png");
+  const auto view =
+      glb.json["bufferViews"][glb.json["images"][image]["bufferView"].get<std::size_t>()];
+  // As any reader of PNG sees it (alpha is left out by this one; see the test of the file).
+  std::ofstream(folder / "texture.png", std::ios::binary) << glb.binary.substr(
+      view["byteOffset"].get<std::size_t>(), view["byteLength"].get<std::size_t>());
+  const Image read = load_image(folder / "texture.png");
+  ASSERT_EQ(read.width, scene.texture[0].width);
+  ASSERT_EQ(read.height, scene.texture[0].height);
+  int compared = 0;
+  for (std::size_t i = 0; i < read.pixels.size(); ++i) {
+    if (scene.alpha[0][i] < 1) continue;  // readers may multiply colour by alpha
+    // Half a step of 8 bits, at most 2.4 / 1.055 / 255 / 2 = 0.0045 in linear values.
+    EXPECT_NEAR(read.pixels[i].r, scene.texture[0].pixels[i].r, 0.0046);
+    EXPECT_NEAR(read.pixels[i].b, scene.texture[0].pixels[i].b, 0.0046);
+    ++compared;
+  }
+  EXPECT_GT(compared, 100);
+  // The screen's corners keep their places in the picture, v turned round.
+  for (const auto& primitive : glb.json["meshes"][0]["primitives"]) {
+    const bool textured = primitive["material"] == screen;
+    EXPECT_EQ(primitive["attributes"].contains("TEXCOORD_0"), textured);
+    if (!textured) continue;
+    const auto uv =
+        glb.read<std::array<float, 2>>(primitive["attributes"]["TEXCOORD_0"].get<std::size_t>());
+    ASSERT_EQ(uv.size(), 8u);
+    EXPECT_EQ(uv[0], (std::array<float, 2>{0, 1}));
+    EXPECT_EQ(uv[2], (std::array<float, 2>{4, -11}));
+  }
+}
+
+// The bytes after the colours of each pixel, from the file itself: its one block is stored plainly.
+TEST(Png, HoldsAlpha) {
+  Image image(3, 2);
+  const std::vector<float> alpha{0, 0.5f, 1, 1, 0.25f, 0};
+  for (std::size_t i = 0; i < 6; ++i) image.pixels[i] = {1, 0, 0.5f};
+  const std::string png = encode_png(image, alpha, false);
+  const std::size_t data = png.find("IDAT") + 4 + 2 + 5;  // zlib's head, the block's head
+  for (std::size_t i = 0; i < 6; ++i) {
+    const std::size_t at = data + i / 3 * 13 + 1 + i % 3 * 4;  // rows begin with their filter
+    const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(png[at + k]); };
+    EXPECT_EQ(byte(0), 255);
+    EXPECT_EQ(byte(1), 0);
+    EXPECT_EQ(byte(2), 128);
+    EXPECT_EQ(byte(3), std::lround(255 * alpha[i]));
   }
 }
 
