@@ -25,13 +25,23 @@ struct SurfaceHit;
 /// both unit and away from the surface. Everything is 0 for w below the shading normal's horizon,
 /// except transmitted deltas. A plain value.
 ///
-/// GGX (metallic_roughness): alpha = roughness^2, height-correlated Smith masking, Schlick Fresnel
-/// with F0 = mix(((ior - 1) / (ior + 1))^2, base colour, metallic). The lobe is scaled by
-/// 1 + F0 (1 - E(o)) / E(o), E the lobe's albedo at F = 1, so that rough metal keeps its energy
-/// (Turquin 2019). The diffuse part lies below the coat: (1 - metallic) base / pi times
-/// (1 - C(o)) (1 - C(w)) / (1 - C_mean), C the coat's albedo at F0 of the dielectric, so that
-/// diffuse and coat together reflect all at base = 1 (Kelemen and Szirmay-Kalos 2001).
-/// Roughness below 0.03 is a mirror (delta) instead of a lobe.
+/// GGX (metallic_roughness), as in glTF 2.0, appendix B: metallic mixes a metal, F0 = base colour,
+/// and a dielectric under a coat, F0 = ((ior - 1) / (ior + 1))^2. alpha = roughness^2,
+/// height-correlated Smith masking, Schlick Fresnel. The lobe of each is scaled by
+/// 1 + F0 (1 - E(o)) / E(o), E the lobe's albedo at F = 1, so that rough surfaces keep their energy
+/// (Turquin 2019); this factor, of o alone, is the only part that is not reciprocal. The diffuse
+/// part lies below the coat: (1 - metallic) base / pi times (1 - C(o)) (1 - C(w)) / (1 - C_mean),
+/// C the coat's albedo, so that diffuse and coat together reflect all at base = 1 (Kelemen and
+/// Szirmay-Kalos 2001). Roughness below kMirrorRoughness is a mirror (delta, Schlick Fresnel)
+/// instead of a lobe. Thin-wall transmission passes straight: a delta of
+/// transmission (1 - metallic) base (1 - C(o)), and the diffuse part keeps 1 - transmission.
+///
+/// Glass: exact unpolarised Fresnel. A triangle's outside is where its corners run
+/// counter-clockwise, whatever its normals say: closed glass must be wound outwards. The weight of
+/// light refracted towards the viewer has the factor (n_viewer / n_light)^2, radiance being
+/// proportional to n^2: inside glass of index n it may reach n^2, and what is lost on the way in is
+/// won back on the way out. A thin pane reflects R' = 2 R / (1 + R), all bounces between its faces,
+/// and lets 1 - R' straight through. `albedo` tints what passes, once a surface, once a pane.
 struct Bsdf {
   Vec3 geometric_normal;  ///< unit, on the viewer's side
   Vec3 normal;            ///< shading normal, unit, on the side of geometric_normal
@@ -39,11 +49,12 @@ struct Bsdf {
 
   // Diffuse.
   RgbD diffuse_reflectance;  ///< (1 - metallic) base colour, or the albedo; 0: none
-  double coat_f0 = 0;        ///< 0: plain Lambert
+  double coat_f0 = 0;        ///< the coat's at normal incidence; 0: plain Lambert
+  double coat_pass = 1;      ///< 1 - C_mean
   // Lobe.
   enum class Lobe { none, phong, ggx };
   Lobe lobe = Lobe::none;
-  double width = 0;   ///< Phong: exponent e; GGX: alpha
+  double width = 0;   ///< Phong: exponent e; GGX and coats: alpha, 0 under a mirror
   RgbD gloss_first;   ///< colour of lobe_values().first, energy compensation included
   RgbD gloss_second;  ///< colour of lobe_values().second; 0 for Phong
   // Single directions.
@@ -51,7 +62,8 @@ struct Bsdf {
     Vec3 direction;            ///< where the light comes from, unit
     RgbD weight;               ///< share of its radiance that leaves towards the viewer
     bool transmitted = false;  ///< continues on the other side of the surface
-    bool enters = false;  ///< transmitted into glass (thick): extinction applies until it exits
+    bool enters = false;  ///< transmitted into glass (thick): extinction applies until it exits,
+                          ///< by a transmitted delta that does not enter
   };
   std::array<Delta, 2> delta{};
   int delta_count = 0;
@@ -75,7 +87,8 @@ struct Bsdf {
   LobeValues lobe_values(const Vec3& w, const Vec3& o) const;
 
   /// A direction of the lobe for to_viewer by two numbers in [0, 1): importance sampled (Phong's
-  /// cosine power, GGX's visible normals), or none when it falls below the horizon.
+  /// cosine power, GGX's visible normals), or none when it falls below the horizon (the density
+  /// integrates to 1 less the chance of that).
   struct Sample {
     Vec3 direction;
     double pdf = 0;  ///< per solid angle, > 0
@@ -88,10 +101,19 @@ struct Bsdf {
   RgbD diffuse_albedo() const;
   RgbD lobe_albedo() const;
 
-  /// The angle (radians) about the lobe's axis that holds most of it; a lobe much wider than a
-  /// texel may be summed over texels, a narrower one must be sampled.
+  /// The angle (radians) from the lobe's axis that holds about half of it, in its narrower
+  /// direction. A lobe much wider than a texel may be summed over texels, a narrower one must be
+  /// sampled. pi without a lobe.
   double lobe_half_width() const;
 };
+
+/// metallic_roughness below this roughness is a mirror. Where a texture leads below it, the lobe
+/// stays at it, so that the material alone says whether a surface has single directions.
+inline constexpr float kMirrorRoughness = 0.03f;
+
+/// Whether a surface of this material can have single directions: mirrors, glass, thin
+/// transmission, smooth metallic_roughness.
+bool has_single_directions(const Material& material);
 
 /// The BSDF of what a ray has met.
 Bsdf bsdf_at(const Scene& scene, const SurfaceHit& hit);
@@ -100,7 +122,8 @@ Bsdf bsdf_at(const Scene& scene, const SurfaceHit& hit);
 Vec3 cosine_direction(const Vec3& normal, double u, double v);
 
 /// Albedo of the GGX lobe, E = integral of D V n.w dw: for F = F0 (1 - s) + s it is
-/// F0 first + second. From a table computed once, in double; `cosine` and `alpha` in [0, 1].
+/// F0 first + second. From a table computed once, in double, within 3e-3 for alpha from
+/// kMirrorRoughness^2 and cosines from 0.02; both in [0, 1], alpha = 0 a mirror.
 Bsdf::LobeValues ggx_albedo(double cosine, double alpha);
 /// Its cosine-weighted mean over the hemisphere.
 Bsdf::LobeValues ggx_mean_albedo(double alpha);

@@ -2,8 +2,9 @@
 
 #include "precompute/surface.h"
 
-#include <algorithm>
 #include <cmath>
+
+#include "precompute/texture.h"
 
 namespace haarlight {
 namespace {
@@ -13,10 +14,19 @@ T interpolate(const T& a, const T& b, const T& c, double b1, double b2) {
   return a * (1 - b1 - b2) + b * b1 + c * b2;
 }
 
-Rgb albedo_at(const Scene& scene, const Triangle& t, double b1, double b2) {
-  const Material& material = scene.material[t.material];
-  Rgb albedo = material.albedo;
-  if (material.texture >= 0) {
+const Image& texture_of(const Scene& scene, int index) {
+  return scene.texture[static_cast<std::size_t>(index)];
+}
+
+// Where on a triangle, as textures see it.
+struct Spot {
+  const Triangle& triangle;
+  double b1, b2;
+  double u = 0, v = 0;
+
+  Spot(const Scene& scene, const Triangle& t, double second, double third)
+      : triangle(t), b1(second), b2(third) {
+    if (scene.texture.empty()) return;
     const auto& a = scene.uv[t.vertex[0]];
     const auto& b = scene.uv[t.vertex[1]];
     const auto& c = scene.uv[t.vertex[2]];
@@ -24,63 +34,108 @@ Rgb albedo_at(const Scene& scene, const Triangle& t, double b1, double b2) {
       return interpolate(static_cast<double>(a[i]), static_cast<double>(b[i]),
                          static_cast<double>(c[i]), b1, b2);
     };
-    albedo = albedo * sample_texture(scene.texture[static_cast<std::size_t>(material.texture)],
-                                     mix(0), mix(1));
+    u = mix(0), v = mix(1);
+  }
+};
+
+Rgb albedo_at(const Scene& scene, const Material& material, const Spot& spot) {
+  Rgb albedo = material.albedo;
+  if (material.texture >= 0) {
+    albedo = albedo * sample_texture(texture_of(scene, material.texture), spot.u, spot.v);
   }
   if (!scene.tint.empty()) {
-    const RgbD tint = RgbD(scene.tint[t.vertex[0]]) * (1 - b1 - b2) +
-                      RgbD(scene.tint[t.vertex[1]]) * b1 + RgbD(scene.tint[t.vertex[2]]) * b2;
+    const auto& vertex = spot.triangle.vertex;
+    const RgbD tint = interpolate(RgbD(scene.tint[vertex[0]]), RgbD(scene.tint[vertex[1]]),
+                                  RgbD(scene.tint[vertex[2]]), spot.b1, spot.b2);
     albedo = albedo * Rgb(tint);
   }
   return albedo;
 }
 
-}  // namespace
-
-Rgb sample_texture(const Image& texture, double u, double v) {
-  if (!std::isfinite(u) || !std::isfinite(v)) u = v = 0;
-  const double x = (u - std::floor(u)) * texture.width - 0.5;
-  const double y = (1 - (v - std::floor(v))) * texture.height - 0.5;
-  const double x0 = std::floor(x), y0 = std::floor(y);
-  const auto wrap = [](double i, int size) {
-    const int k = static_cast<int>(i) % size;
-    return k < 0 ? k + size : k;
+// `smooth` (unit) as the normal texture has it. The tangent runs along u, the bitangent along v,
+// both across `smooth`; a triangle without area in the texture keeps its normal.
+Vec3 bumped(const Scene& scene, const Material& material, const Spot& spot, const Vec3& smooth,
+            const Vec3& ab, const Vec3& ac) {
+  const auto& vertex = spot.triangle.vertex;
+  const auto uv = [&](std::size_t corner, std::size_t i) {
+    return static_cast<double>(scene.uv[vertex[corner]][i]);
   };
-  const int left = wrap(x0, texture.width), right = wrap(x0 + 1, texture.width);
-  const int top = wrap(y0, texture.height), bottom = wrap(y0 + 1, texture.height);
-  const auto fx = static_cast<float>(x - x0), fy = static_cast<float>(y - y0);
-  const Rgb upper = texture.at(left, top) * (1 - fx) + texture.at(right, top) * fx;
-  const Rgb lower = texture.at(left, bottom) * (1 - fx) + texture.at(right, bottom) * fx;
-  return upper * (1 - fy) + lower * fy;
+  const double u1 = uv(1, 0) - uv(0, 0), v1 = uv(1, 1) - uv(0, 1);
+  const double u2 = uv(2, 0) - uv(0, 0), v2 = uv(2, 1) - uv(0, 1);
+  const double area = u1 * v2 - u2 * v1;
+  Vec3 along = area < 0 ? ab * -v2 + ac * v1 : ab * v2 - ac * v1;  // dp/du, but for its length
+  along = along - dot(along, smooth) * smooth;
+  const double size = length(along);
+  if (area == 0 || !(size > 0) || !std::isfinite(size)) return smooth;
+  const Vec3 tangent = along * (1 / size);
+  // A texture that is mirrored on the surface turns the frame's hand round.
+  const bool mirrored = (dot(cross(ab, ac), smooth) < 0) != (area < 0);
+  const Vec3 bitangent = mirrored ? -cross(smooth, tangent) : cross(smooth, tangent);
+  const RgbD texel(sample_texture(texture_of(scene, material.normal_texture), spot.u, spot.v));
+  const double scale = static_cast<double>(material.normal_scale);
+  const Vec3 bump = tangent * ((2 * texel.r - 1) * scale) +
+                    bitangent * ((2 * texel.g - 1) * scale) + smooth * (2 * texel.b - 1);
+  const double bump_size = length(bump);
+  return bump_size > 1e-6 ? bump * (1 / bump_size) : smooth;
 }
+
+// Turns `normal` towards `direction` (both unit, not opposite) until it is above its horizon.
+Vec3 bent_towards(const Vec3& normal, const Vec3& direction) {
+  constexpr double kLeast = 1e-3;
+  const double cosine = dot(normal, direction);
+  if (cosine > 0) return normal;
+  const Vec3 bent = normal + (kLeast - cosine) * direction;
+  const double size = length(bent);
+  return size > 1e-6 ? bent * (1 / size) : direction;
+}
+
+}  // namespace
 
 std::optional<SurfaceHit> surface_hit(const Scene& scene, const Visibility& visibility,
                                       const Vec3& origin, const Vec3& direction) {
   const std::optional<Visibility::Hit> hit = visibility.first_hit(origin, direction);
   if (!hit) return std::nullopt;
-  const Triangle& t = scene.triangle[hit->triangle];
-  const Vec3 a = visibility.corner(hit->triangle, 0), b = visibility.corner(hit->triangle, 1),
-             c = visibility.corner(hit->triangle, 2);
+  return surface_at(scene, visibility, *hit, direction);
+}
+
+SurfaceHit surface_at(const Scene& scene, const Visibility& visibility, const Visibility::Hit& hit,
+                      const Vec3& direction) {
+  const Triangle& t = scene.triangle[hit.triangle];
+  const Material& material = scene.material[t.material];
+  const Spot spot(scene, t, hit.b1, hit.b2);
+  const Vec3 a = visibility.corner(hit.triangle, 0), b = visibility.corner(hit.triangle, 1),
+             c = visibility.corner(hit.triangle, 2);
   SurfaceHit surface;
-  surface.distance = hit->distance;
+  surface.distance = hit.distance;
   surface.material = t.material;
   surface.to_viewer = -direction;
   // From the barycentric coordinates, in double: this lies in the plane Embree tests against, which
   // origin + distance * direction does not.
-  surface.position = interpolate(a, b, c, hit->b1, hit->b2);
+  surface.position = interpolate(a, b, c, hit.b1, hit.b2);
   const Vec3 across = cross(b - a, c - a);
   const double twice_area = length(across);
   // A sliver whose corners coincide after rounding to float is hit edge-on if at all.
   surface.geometric_normal = twice_area > 0 ? across * (1 / twice_area) : -direction;
-  if (dot(surface.geometric_normal, direction) > 0) {
-    surface.geometric_normal = -surface.geometric_normal;
+  surface.outside = dot(surface.geometric_normal, direction) <= 0;
+  if (!surface.outside) surface.geometric_normal = -surface.geometric_normal;
+
+  Vec3 normal = interpolate(scene.normal[t.vertex[0]], scene.normal[t.vertex[1]],
+                            scene.normal[t.vertex[2]], hit.b1, hit.b2);
+  const double smooth_length = length(normal);
+  normal = smooth_length > 1e-6 ? normal * (1 / smooth_length) : surface.geometric_normal;
+  const bool turn = dot(normal, surface.geometric_normal) < 0;
+  if (material.normal_texture >= 0) normal = bumped(scene, material, spot, normal, b - a, c - a);
+  if (turn) normal = -normal;
+  normal = bent_towards(normal, surface.geometric_normal);
+  surface.normal = bent_towards(normal, surface.to_viewer);
+
+  surface.albedo = albedo_at(scene, material, spot);
+  surface.metallic = material.metallic, surface.roughness = material.roughness;
+  if (material.metallic_roughness_texture >= 0) {
+    const Rgb factor =
+        sample_texture(texture_of(scene, material.metallic_roughness_texture), spot.u, spot.v);
+    surface.metallic *= factor.b, surface.roughness *= factor.g;
   }
-  const Vec3 smooth = interpolate(scene.normal[t.vertex[0]], scene.normal[t.vertex[1]],
-                                  scene.normal[t.vertex[2]], hit->b1, hit->b2);
-  const double smooth_length = length(smooth);
-  surface.normal = smooth_length > 1e-6 ? smooth * (1 / smooth_length) : surface.geometric_normal;
-  if (dot(surface.normal, surface.geometric_normal) < 0) surface.normal = -surface.normal;
-  surface.albedo = albedo_at(scene, t, hit->b1, hit->b2);
   return surface;
 }
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <random>
 
+#include "precompute/texture.h"
 #include "tests/precompute/shapes.h"
 
 namespace haarlight {
