@@ -33,6 +33,13 @@ Vec3 mirrored(const Vec3& to_viewer, const Vec3& normal) {
   return normalize(2 * dot(normal, to_viewer) * normal - to_viewer);
 }
 
+// `normal` turned towards `direction` until it is just above its horizon, as surfaces in
+// precompute/surface.h have it.
+Vec3 facing(const Vec3& normal, const Vec3& direction) {
+  const double cosine = dot(normal, direction);
+  return cosine > 0 ? normal : normalize(normal + (1e-3 - cosine) * direction);
+}
+
 // Unpolarised reflectance of a smooth surface; `eta` is the index of refraction on the other side
 // over that on this side.
 double fresnel(double cosine, double eta) {
@@ -81,7 +88,8 @@ struct PathTracer::Surface {
     RgbD weight;
     double chance = 0;
     bool transmitted = false;
-    RgbD extinction;  // from here on, if transmitted
+    RgbD extinction;    // from here on, if transmitted
+    double denser = 1;  // the part of `weight` that is won back on the way out
   };
   std::array<Delta, 2> delta;
 
@@ -111,6 +119,18 @@ struct PathTracer::Surface {
     return about(normal, std::sqrt(1 - u), turn);
   }
 };
+
+namespace {
+
+// By Snell's law the part across the normal shrinks by eta.
+std::optional<Vec3> refracted(const Vec3& direction, const Vec3& normal, double eta) {
+  const Vec3 across = (direction - dot(direction, normal) * normal) * (1 / eta);
+  const double sine_squared = dot(across, across);
+  if (sine_squared >= 1) return std::nullopt;
+  return normalize(across - normal * std::sqrt(1 - sine_squared));
+}
+
+}  // namespace
 
 PathTracer::PathTracer(const Scene& scene, const Sky& sky, const PathOptions& options)
     : scene_(scene), sky_(sky), options_(options), tree_(scene) {
@@ -173,6 +193,12 @@ PathTracer::Surface PathTracer::surface(const TriangleTree::Hit& hit, const Vec3
   if (from_behind) s.geometric_normal = -s.geometric_normal;
   s.normal = normalize(interpolate(normal, hit));
   if (dot(s.normal, s.geometric_normal) < 0) s.normal = -s.normal;
+  s.normal = facing(s.normal, s.to_viewer);
+  // A smooth normal may send single directions to the wrong side; the true one never does.
+  const auto reflected = [&s] {
+    const Vec3 smooth = mirrored(s.to_viewer, s.normal);
+    return dot(smooth, s.geometric_normal) > 0 ? smooth : mirrored(s.to_viewer, s.geometric_normal);
+  };
 
   RgbD albedo = RgbD(m.albedo) * interpolate(tint, hit);
   if (m.texture >= 0) {
@@ -194,21 +220,27 @@ PathTracer::Surface PathTracer::surface(const TriangleTree::Hit& hit, const Vec3
       throw Error(ErrorKind::invalid_argument,
                   "reference path tracer: metallic-roughness is not known");
     case SurfaceModel::mirror:
-      s.delta[0] = {mirrored(s.to_viewer, s.normal), albedo, largest(albedo), false, {}};
+      s.delta[0] = {reflected(), albedo, largest(albedo), false, {}};
       break;
     case SurfaceModel::glass: {
       const double index = static_cast<double>(m.ior);
-      const double cosine = dot(s.normal, s.to_viewer);
-      const double eta = from_behind ? 1 / index : index;
-      double share = fresnel(std::abs(cosine), m.thin ? index : eta);
-      if (m.thin) share = 2 * share / (1 + share);  // back and forth between both surfaces
-      s.delta[0] = {mirrored(s.to_viewer, s.normal), albedo * share, share, false, {}};
-      if (share == 1) break;
-      // Snell's law: the part across the normal shrinks by eta.
-      const Vec3 across = (direction + cosine * s.normal) * (1 / eta);
-      const Vec3 bent = across - s.normal * std::sqrt(std::max(0.0, 1 - dot(across, across)));
-      s.delta[1] = {m.thin ? direction : normalize(bent), albedo * (1 - share), 1 - share, true,
-                    from_behind || m.thin ? RgbD{} : RgbD(m.extinction)};
+      const double eta = m.thin || !from_behind ? index : 1 / index;
+      double share = fresnel(dot(s.normal, s.to_viewer), eta);
+      if (m.thin) share = 2 * share / (1 + share);  // back and forth between both faces
+      s.delta[0] = {reflected(), RgbD{share, share, share}, share, false, {}};
+      std::optional<Vec3> bent = m.thin ? direction : refracted(direction, s.normal, eta);
+      if (bent && !(dot(*bent, s.geometric_normal) < 0)) {
+        bent = refracted(direction, s.geometric_normal, eta);
+      }
+      if (share == 1 || !bent) break;
+      // Radiance goes with the square of the index.
+      const double denser = m.thin ? 1 : 1 / (eta * eta);
+      s.delta[1] = {*bent,
+                    albedo * ((1 - share) * denser),
+                    1 - share,
+                    true,
+                    from_behind || m.thin ? RgbD{} : RgbD(m.extinction),
+                    denser};
       break;
     }
   }
@@ -232,6 +264,7 @@ RgbD PathTracer::path(Vec3 origin, Vec3 direction, Random& random) const {
   RgbD light, throughput{1, 1, 1}, extinction;
   int scattered = 0;   // diffuse and glossy surfaces met
   double density = 0;  // of the direction, if the last surface scattered
+  double denser = 1;   // how much of the throughput is won back where it leaves glass
   bool single = true;  // the direction is a mirror's or glass's, or the camera's
   const auto sky = [&] {
     const bool balanced = options_.next_event && !single;
@@ -266,9 +299,7 @@ RgbD PathTracer::path(Vec3 origin, Vec3 direction, Random& random) const {
       single = true;
       direction = delta->direction;
       throughput = throughput * delta->weight * (1 / delta->chance);
-      if (delta->transmitted) extinction = delta->extinction;
-      // A smooth normal may send light to the wrong side of the triangle.
-      if ((dot(direction, s.geometric_normal) < 0) != delta->transmitted) return light;
+      if (delta->transmitted) extinction = delta->extinction, denser *= delta->denser;
       origin = s.position + s.geometric_normal * (delta->transmitted ? -offset : offset);
     } else {
       if (!s.scatters()) return light;  // the last chance was rounded away
@@ -284,7 +315,7 @@ RgbD PathTracer::path(Vec3 origin, Vec3 direction, Random& random) const {
     }
     // Russian roulette.
     if (depth < 3) continue;
-    const double stay = std::min(0.95, largest(throughput));
+    const double stay = std::min(0.95, largest(throughput) / denser);
     if (random.unit() >= stay) return light;
     throughput *= 1 / stay;
   }
