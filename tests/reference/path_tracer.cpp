@@ -9,7 +9,9 @@
 
 #include "core/error.h"
 #include "core/parallel.h"
+#include "precompute/bsdf.h"
 #include "precompute/surface.h"
+#include "precompute/texture.h"
 
 namespace haarlight::reference {
 namespace {
@@ -80,6 +82,7 @@ struct PathTracer::Surface {
   RgbD diffuse, gloss;
   double exponent = 0;
   Vec3 mirror;
+  std::optional<Bsdf> coated;  // metallic-roughness, instead of both
   // Chances of the parts; together at most 1.
   double diffuse_chance = 0, gloss_chance = 0;
 
@@ -99,6 +102,11 @@ struct PathTracer::Surface {
   // BRDF times cosine for light from w.
   RgbD factor(const Vec3& w) const {
     if (!above(w)) return {};
+    if (coated) {
+      const Bsdf::LobeValues lobe = coated->lobe_values(w);
+      return coated->diffuse_out(to_viewer) * coated->diffuse_in(w) +
+             coated->gloss_first * lobe.first + coated->gloss_second * lobe.second;
+    }
     const double along = std::max(0.0, dot(w, mirror));
     return (diffuse * (1 / kPi) +
             gloss * ((exponent + 2) / (2 * kPi) * std::pow(along, exponent))) *
@@ -107,14 +115,22 @@ struct PathTracer::Surface {
   // Density of scatter(), chances of the parts included.
   double density(const Vec3& w) const {
     double sum = diffuse_chance * std::max(0.0, dot(w, normal)) / kPi;
-    if (gloss_chance > 0) {
+    if (coated && gloss_chance > 0) {
+      sum += gloss_chance * coated->lobe_pdf(w);
+    } else if (gloss_chance > 0) {
       sum += gloss_chance * (exponent + 1) / (2 * kPi) *
              std::pow(std::max(0.0, dot(w, mirror)), exponent);
     }
     return sum;
   }
-  Vec3 scatter(bool glossy, Random& random) const {
-    const double u = random.unit(), turn = 2 * kPi * random.unit();
+  // Nothing where a lobe points below the horizon.
+  std::optional<Vec3> scatter(bool glossy, Random& random) const {
+    const double u = random.unit(), v = random.unit();
+    if (glossy && coated) {
+      const auto sample = coated->sample_lobe(u, v);
+      return sample ? std::optional(sample->direction) : std::nullopt;
+    }
+    const double turn = 2 * kPi * v;
     if (glossy) return about(mirror, std::pow(1 - u, 1 / (exponent + 1)), turn);
     return about(normal, std::sqrt(1 - u), turn);
   }
@@ -143,7 +159,13 @@ PathTracer::PathTracer(const Scene& scene, const Sky& sky, const PathOptions& op
     }
     alpha_.push_back(std::move(image));
   }
-  for (const Material& m : scene.material) has_holes_ = has_holes_ || m.alpha_cutoff > 0;
+  for (const Material& m : scene.material) {
+    has_holes_ = has_holes_ || m.alpha_cutoff > 0;
+    if (m.normal_texture >= 0) {
+      throw Error(ErrorKind::invalid_argument,
+                  scene.name + ": material " + m.name + " has a normal texture, expected none");
+    }
+  }
 }
 
 bool PathTracer::is_hole(const TriangleTree::Hit& hit) const {
@@ -216,9 +238,33 @@ PathTracer::Surface PathTracer::surface(const TriangleTree::Hit& hit, const Vec3
         s.mirror = mirrored(s.to_viewer, s.normal);
       }
       break;
-    case SurfaceModel::metallic_roughness:
-      throw Error(ErrorKind::invalid_argument,
-                  "reference path tracer: metallic-roughness is not known");
+    case SurfaceModel::metallic_roughness: {
+      SurfaceHit seen;
+      seen.position = s.position;
+      seen.geometric_normal = s.geometric_normal;
+      seen.normal = s.normal;
+      seen.to_viewer = s.to_viewer;
+      seen.material = t.material;
+      seen.albedo = Rgb(albedo);
+      seen.metallic = m.metallic;
+      seen.roughness = m.roughness;
+      if (m.metallic_roughness_texture >= 0) {
+        const Rgb factor =
+            sample_texture(scene_.texture[static_cast<std::size_t>(m.metallic_roughness_texture)],
+                           interpolate(u, hit), interpolate(v, hit));
+        seen.metallic *= factor.b, seen.roughness *= factor.g;
+      }
+      seen.outside = !from_behind;
+      s.coated = bsdf_at(scene_, seen);
+      s.diffuse_chance = largest(s.coated->diffuse_albedo());
+      if (options_.gloss) s.gloss_chance = largest(s.coated->lobe_albedo());
+      if (!options_.gloss) s.coated->lobe = Bsdf::Lobe::none;
+      for (std::size_t k = 0; k < static_cast<std::size_t>(s.coated->delta_count); ++k) {
+        const Bsdf::Delta& d = s.coated->delta[k];
+        s.delta[k] = {d.direction, d.weight, largest(d.weight), d.transmitted, {}};
+      }
+      break;
+    }
     case SurfaceModel::mirror:
       s.delta[0] = {reflected(), albedo, largest(albedo), false, {}};
       break;
@@ -305,7 +351,9 @@ RgbD PathTracer::path(Vec3 origin, Vec3 direction, Random& random) const {
       if (!s.scatters()) return light;  // the last chance was rounded away
       single = false;
       ++scattered;
-      direction = s.scatter(choice >= s.diffuse_chance, random);
+      const auto way = s.scatter(choice >= s.diffuse_chance, random);
+      if (!way) return light;
+      direction = *way;
       density = s.density(direction);
       const RgbD factor = s.factor(direction);
       if (!(largest(factor) > 0)) return light;

@@ -40,9 +40,12 @@ struct Estimate {
   RgbD variance;  ///< of the mean, estimated from the spread of the paths
 };
 
-/// Keeps references to scene and sky. Immutable, shared by all threads.
+/// Keeps references to scene and sky. Immutable, shared by all threads. Of materials it knows all
+/// but normal textures; metallic-roughness is asked of precompute/bsdf.h, everything else is its
+/// own.
 class PathTracer {
  public:
+  /// Throws Error{missing} without triangles, Error{invalid_argument} for a normal texture.
   PathTracer(const Scene& scene, const Sky& sky, const PathOptions& options = {});
 
   /// Radiance arriving at `origin` (world) from the unit `direction`. `stream` tells estimates of

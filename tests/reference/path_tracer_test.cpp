@@ -132,6 +132,31 @@ TEST(PathTracer, PhongLobeSeenStraightOnKeepsItsReflectance) {
   }
 }
 
+// White metal and white plastic lose nothing: the lobe is compensated, and what the coat lets pass
+// comes back from below. Both to the 1 % that their tables promise.
+TEST(PathTracer, MetallicRoughnessKeepsItsEnergy) {
+  Scene scene = ground();
+  Material& m = scene.material[0];
+  m.model = SurfaceModel::metallic_roughness;
+  m.albedo = {1, 1, 1};
+  Cubemap white(4);
+  for (Rgb& c : white.texels) c = {1, 1, 1};
+  const Sky sky(white);
+  for (const float metallic : {0.0f, 1.0f}) {
+    for (const float roughness : {0.0f, 0.1f, 0.4f, 1.0f}) {
+      m.metallic = metallic, m.roughness = roughness;
+      for (const bool aim : {false, true}) {
+        PathOptions options;
+        options.samples = 20'000;
+        options.next_event = aim;
+        const Estimate e = PathTracer(scene, sky, options).radiance({0, 3, 0}, {0.6, -0.8, 0});
+        SCOPED_TRACE(metallic + 10 * roughness);
+        expect_near(e, {1, 1, 1}, 0.01, 0.01);
+      }
+    }
+  }
+}
+
 // Inside a sphere every place sees every other with the same form factor. Where a cap of share f of
 // its area is open to an even sky of 1, the wall is equally bright everywhere:
 //   B = rho (f + (1 - f) B),  and after n bounces  B_n = rho f sum over k <= n of (rho (1 - f))^k.
