@@ -8,8 +8,11 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <vector>
 
 #include "core/error.h"
+#include "precompute/alpha_holes.h"
+#include "precompute/bsdf.h"
 
 #if HAARLIGHT_EMBREE == 4
 #include <embree4/rtcore.h>
@@ -21,12 +24,30 @@
 
 namespace haarlight {
 
+namespace {
+
+// Triangles by what rays do with them; each kind is one geometry of Embree.
+enum Kind : std::size_t { opaque, opaque_holed, specular, specular_holed, kinds };
+
+Kind kind_of(const Material& material) {
+  const bool holed = material.alpha_cutoff > 0;
+  if (has_single_directions(material)) return holed ? specular_holed : specular;
+  return holed ? opaque_holed : opaque;
+}
+
+}  // namespace
+
 struct Visibility::Device {
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
   const float* position = nullptr;              // in Embree's buffer, 3 a vertex
-  const std::uint32_t* corner_index = nullptr;  // in Embree's buffer, 3 a triangle
+  const std::uint32_t* corner_index = nullptr;  // in Embree's buffer, 3 a place
   bool packets = false;                         // 8-wide packets are native
+  // Embree's triangles are in the order of their kinds. Where there is more than one kind:
+  std::array<std::uint32_t, kinds> first{};  // the place where each begins
+  std::vector<std::uint32_t> triangle_at;    // of a place; empty: the same number
+  std::vector<std::uint32_t> place_of;       // of a triangle
+  std::array<AlphaHoles, kinds> holes;
 
   ~Device() {
     if (scene) rtcReleaseScene(scene);
@@ -82,6 +103,35 @@ void intersect_one(RTCScene scene, RTCRayHit* ray) {
 }
 #endif
 
+// Takes back hits in holes.
+void pass_holes(const RTCFilterFunctionNArguments* arguments) {
+  const auto& holes = *static_cast<const AlphaHoles*>(arguments->geometryUserPtr);
+  for (unsigned i = 0; i < arguments->N; ++i) {
+    if (arguments->valid[i] == 0) continue;
+    const auto b1 = static_cast<double>(RTCHitN_u(arguments->hit, arguments->N, i));
+    const auto b2 = static_cast<double>(RTCHitN_v(arguments->hit, arguments->N, i));
+    if (holes.is_hole(RTCHitN_primID(arguments->hit, arguments->N, i), b1, b2)) {
+      arguments->valid[i] = 0;
+    }
+  }
+}
+
+// A buffer of Embree, let go of at the end of the scope; geometries keep what they use.
+struct Buffer {
+  RTCBuffer buffer;
+  void* data;
+
+  // Embree reads up to 16 bytes at once: past the end, too.
+  Buffer(RTCDevice device, std::size_t bytes)
+      : buffer(rtcNewBuffer(device, bytes + 16)),
+        data(buffer ? rtcGetBufferData(buffer) : nullptr) {}
+  ~Buffer() {
+    if (buffer) rtcReleaseBuffer(buffer);
+  }
+  Buffer(const Buffer&) = delete;
+  Buffer& operator=(const Buffer&) = delete;
+};
+
 }  // namespace
 
 Visibility::Visibility(const Scene& scene) : device_(std::make_unique<Device>()) {
@@ -120,34 +170,73 @@ Visibility::Visibility(const Scene& scene) : device_(std::make_unique<Device>())
   }
   device_->packets =
       rtcGetDeviceProperty(device_->device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0;
-  RTCGeometry geometry = rtcNewGeometry(device_->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* position = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
-                                                               RTC_FORMAT_FLOAT3, 3 * sizeof(float),
-                                                               scene.position.size()));
-  auto* index = static_cast<std::uint32_t*>(
-      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                              3 * sizeof(std::uint32_t), triangle_count_));
+
+  std::array<std::size_t, kinds> count{};
+  for (const Triangle& t : scene.triangle) ++count[kind_of(scene.material[t.material])];
+  has_specular_ = count[specular] + count[specular_holed] > 0;
+  has_holes_ = count[opaque_holed] + count[specular_holed] > 0;
+  if ((has_specular_ &&
+       rtcGetDeviceProperty(device_->device, RTC_DEVICE_PROPERTY_RAY_MASK_SUPPORTED) == 0) ||
+      (has_holes_ &&
+       rtcGetDeviceProperty(device_->device, RTC_DEVICE_PROPERTY_FILTER_FUNCTION_SUPPORTED) == 0)) {
+    throw Error(ErrorKind::io, fmt::format("{}: Embree was built without ray masks or filter "
+                                           "functions, expected both for mirrors, glass and holes",
+                                           scene.name));
+  }
+  for (std::size_t k = 1; k < kinds; ++k) {
+    device_->first[k] = device_->first[k - 1] + static_cast<std::uint32_t>(count[k - 1]);
+  }
+  const bool mixed = std::count(count.begin(), count.end(), triangle_count_) == 0;
+
   device_->scene = rtcNewScene(device_->device);
-  if (!position || !index || !device_->scene) {
-    rtcReleaseGeometry(geometry);
+  const Buffer positions(device_->device, 3 * sizeof(float) * scene.position.size());
+  const Buffer indices(device_->device, 3 * sizeof(std::uint32_t) * triangle_count_);
+  if (!positions.data || !indices.data || !device_->scene) {
     device_->check(fmt::format("{}: {} triangles", scene.name, triangle_count_));
     throw Error(ErrorKind::io, fmt::format("{}: Embree has no room for {} triangles", scene.name,
                                            triangle_count_));
   }
+  auto* position = static_cast<float*>(positions.data);
   for (std::size_t v = 0; v < scene.position.size(); ++v) {
     const Vec3 p = to_local(scene.position[v]);
     position[3 * v] = static_cast<float>(p.x);
     position[3 * v + 1] = static_cast<float>(p.y);
     position[3 * v + 2] = static_cast<float>(p.z);
   }
+  auto* index = static_cast<std::uint32_t*>(indices.data);
+  if (mixed)
+    device_->triangle_at.resize(triangle_count_), device_->place_of.resize(triangle_count_);
+  std::array<std::uint32_t, kinds> next = device_->first;
   for (std::size_t t = 0; t < triangle_count_; ++t) {
-    for (std::size_t c = 0; c < 3; ++c) index[3 * t + c] = scene.triangle[t].vertex[c];
+    const Triangle& triangle = scene.triangle[t];
+    const Kind kind = kind_of(scene.material[triangle.material]);
+    const std::size_t place = next[kind]++;
+    for (std::size_t c = 0; c < 3; ++c) index[3 * place + c] = triangle.vertex[c];
+    if (kind == opaque_holed || kind == specular_holed) device_->holes[kind].add(scene, triangle);
+    if (!mixed) continue;
+    device_->triangle_at[place] = static_cast<std::uint32_t>(t);
+    device_->place_of[t] = static_cast<std::uint32_t>(place);
   }
   device_->position = position;
   device_->corner_index = index;
-  rtcCommitGeometry(geometry);
-  rtcAttachGeometry(device_->scene, geometry);
-  rtcReleaseGeometry(geometry);  // the scene keeps it
+  for (std::size_t k = 0; k < kinds; ++k) {
+    if (count[k] == 0) continue;
+    RTCGeometry geometry = rtcNewGeometry(device_->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    rtcSetGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, positions.buffer,
+                         0, 3 * sizeof(float), scene.position.size());
+    rtcSetGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, indices.buffer,
+                         3 * sizeof(std::uint32_t) * device_->first[k], 3 * sizeof(std::uint32_t),
+                         count[k]);
+    rtcSetGeometryMask(geometry, k == specular || k == specular_holed ? kSpecular : kOpaque);
+    if (k == opaque_holed || k == specular_holed) {
+      rtcSetGeometryUserData(geometry, &device_->holes[k]);
+      rtcSetGeometryIntersectFilterFunction(geometry, pass_holes);
+      rtcSetGeometryOccludedFilterFunction(geometry, pass_holes);
+    }
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometryByID(device_->scene, geometry, static_cast<unsigned>(k));
+    rtcReleaseGeometry(geometry);  // the scene keeps it
+  }
   // Robust: no ray slips between triangles that share an edge.
   rtcSetSceneFlags(device_->scene, RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(device_->scene, RTC_BUILD_QUALITY_HIGH);
@@ -157,8 +246,8 @@ Visibility::Visibility(const Scene& scene) : device_(std::make_unique<Device>())
 
 Visibility::~Visibility() = default;
 
-std::optional<Visibility::Hit> Visibility::first_hit(const Vec3& origin,
-                                                     const Vec3& direction) const {
+std::optional<Visibility::Hit> Visibility::first_hit(const Vec3& origin, const Vec3& direction,
+                                                     Surfaces seen) const {
   RTCRayHit ray;
   std::memset(&ray, 0, sizeof ray);
   ray.ray.org_x = static_cast<float>(origin.x);
@@ -168,17 +257,43 @@ std::optional<Visibility::Hit> Visibility::first_hit(const Vec3& origin,
   ray.ray.dir_y = static_cast<float>(direction.y);
   ray.ray.dir_z = static_cast<float>(direction.z);
   ray.ray.tfar = kInfinity;
-  ray.ray.mask = ~0u;
+  ray.ray.mask = seen;
   ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   ray.hit.primID = RTC_INVALID_GEOMETRY_ID;
   intersect_one(device_->scene, &ray);
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-  return Hit{ray.hit.primID, static_cast<double>(ray.hit.u), static_cast<double>(ray.hit.v),
+  const std::uint32_t place = device_->first[ray.hit.geomID] + ray.hit.primID;
+  return Hit{device_->triangle_at.empty() ? place : device_->triangle_at[place],
+             static_cast<double>(ray.hit.u), static_cast<double>(ray.hit.v),
              static_cast<double>(ray.ray.tfar)};
 }
 
+bool Visibility::occluded(const std::array<float, 3>& origin, const Vec3& direction,
+                          double distance, Surfaces seen) const {
+  RTCRay ray{};
+  ray.org_x = origin[0], ray.org_y = origin[1], ray.org_z = origin[2];
+  ray.dir_x = static_cast<float>(direction.x);
+  ray.dir_y = static_cast<float>(direction.y);
+  ray.dir_z = static_cast<float>(direction.z);
+  ray.tfar = static_cast<float>(distance);
+  ray.mask = seen;
+  occluded_one(device_->scene, &ray);
+  return ray.tfar < 0;
+}
+
 unsigned Visibility::occluded8(const std::array<float, 3>& origin, const float* x, const float* y,
-                               const float* z, unsigned lanes) const {
+                               const float* z, unsigned lanes, Surfaces seen) const {
+  return trace8(origin, x, y, z, lanes, kInfinity, seen);
+}
+
+unsigned Visibility::occluded8_segments(const std::array<float, 3>& origin, const float* x,
+                                        const float* y, const float* z, unsigned lanes,
+                                        Surfaces seen) const {
+  return trace8(origin, x, y, z, lanes, 1.0f, seen);
+}
+
+unsigned Visibility::trace8(const std::array<float, 3>& origin, const float* x, const float* y,
+                            const float* z, unsigned lanes, float distance, Surfaces seen) const {
   if (!device_->packets) {
     unsigned blocked = 0;
     for (unsigned i = 0; i < 8; ++i) {
@@ -186,8 +301,8 @@ unsigned Visibility::occluded8(const std::array<float, 3>& origin, const float* 
       RTCRay ray{};
       ray.org_x = origin[0], ray.org_y = origin[1], ray.org_z = origin[2];
       ray.dir_x = x[i], ray.dir_y = y[i], ray.dir_z = z[i];
-      ray.tfar = kInfinity;
-      ray.mask = ~0u;
+      ray.tfar = distance;
+      ray.mask = seen;
       occluded_one(device_->scene, &ray);
       if (ray.tfar < 0) blocked |= 1u << i;
     }
@@ -200,9 +315,9 @@ unsigned Visibility::occluded8(const std::array<float, 3>& origin, const float* 
     ray.org_x[i] = origin[0], ray.org_y[i] = origin[1], ray.org_z[i] = origin[2];
     ray.dir_x[i] = x[i], ray.dir_y[i] = y[i], ray.dir_z[i] = z[i];
     ray.tnear[i] = 0;
-    ray.tfar[i] = kInfinity;
+    ray.tfar[i] = distance;
     ray.time[i] = 0;
-    ray.mask[i] = ~0u;
+    ray.mask[i] = seen;
     ray.id[i] = i;
     ray.flags[i] = 0;
   }
@@ -215,7 +330,8 @@ unsigned Visibility::occluded8(const std::array<float, 3>& origin, const float* 
 }
 
 Vec3 Visibility::corner(std::uint32_t triangle, int corner) const {
-  const std::uint32_t v = device_->corner_index[3 * std::size_t{triangle} + std::size_t(corner)];
+  const std::size_t place = device_->place_of.empty() ? triangle : device_->place_of[triangle];
+  const std::uint32_t v = device_->corner_index[3 * place + std::size_t(corner)];
   const float* p = device_->position + 3 * std::size_t{v};
   return {static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])};
 }

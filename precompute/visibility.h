@@ -14,6 +14,8 @@
 namespace haarlight {
 
 /// The triangles of a scene, ready for rays. Immutable and safe to use from any number of threads.
+/// Rays pass through the holes that alpha textures cut (Material::alpha_cutoff). The scene is not
+/// needed afterwards.
 ///
 /// Rays live in local coordinates: the scene moved to the middle of its bounding box and scaled by
 /// a power of two so that its largest coordinate is in [1, 2). So single precision is spent on the
@@ -21,6 +23,13 @@ namespace haarlight {
 /// a power of two gives the same bits.
 class Visibility {
  public:
+  /// Which surfaces a ray sees.
+  enum Surfaces : unsigned {
+    kOpaque = 1,    ///< those that has_single_directions() denies
+    kSpecular = 2,  ///< those that may have some: mirrors, glass, thin transmission
+    kAll = 3
+  };
+
   /// Throws Error{missing} for a scene without triangles, Error{io} if Embree refuses.
   explicit Visibility(const Scene& scene);
   ~Visibility();
@@ -40,24 +49,42 @@ class Visibility {
     double distance = 0;    ///< local units
   };
   /// The nearest triangle in front of `origin` (local) along the unit `direction`.
-  std::optional<Hit> first_hit(const Vec3& origin, const Vec3& direction) const;
+  std::optional<Hit> first_hit(const Vec3& origin, const Vec3& direction,
+                               Surfaces seen = kAll) const;
+
+  /// Whether anything lies between `origin` (local) and origin + distance * direction. Both ends
+  /// should be off the surfaces they belong to (kSurfaceOffset): what is met at an end blocks.
+  bool occluded(const std::array<float, 3>& origin, const Vec3& direction, double distance,
+                Surfaces seen = kAll) const;
 
   /// Which of 8 rays from one origin (local) are blocked at any distance: bit i for direction
   /// (x[i], y[i], z[i]). Only the lanes set in `lanes` are traced, the others read as not blocked.
   /// x, y and z are aligned to 32 bytes.
   unsigned occluded8(const std::array<float, 3>& origin, const float* x, const float* y,
-                     const float* z, unsigned lanes) const;
+                     const float* z, unsigned lanes, Surfaces seen = kAll) const;
+
+  /// The same for segments from `origin` to origin + (x[i], y[i], z[i]), of any length. What is met
+  /// at an end blocks: shorten or move what should not reach its own surface. A segment of no
+  /// length is not blocked.
+  unsigned occluded8_segments(const std::array<float, 3>& origin, const float* x, const float* y,
+                              const float* z, unsigned lanes, Surfaces seen = kAll) const;
 
   std::size_t triangle_count() const { return triangle_count_; }
+  /// Whether any triangle is seen by kSpecular rays; has an alpha cutoff.
+  bool has_specular() const { return has_specular_; }
+  bool has_holes() const { return has_holes_; }
   /// Corner 0, 1 or 2 of a triangle as Embree holds it, local.
   Vec3 corner(std::uint32_t triangle, int corner) const;
 
  private:
   struct Device;
+  unsigned trace8(const std::array<float, 3>& origin, const float* x, const float* y,
+                  const float* z, unsigned lanes, float distance, Surfaces seen) const;
   std::unique_ptr<Device> device_;
   Vec3 center_;
   double scale_ = 1;
   std::size_t triangle_count_ = 0;
+  bool has_specular_ = false, has_holes_ = false;
 };
 
 }  // namespace haarlight

@@ -16,14 +16,19 @@ namespace haarlight::reference {
 struct RayResult {
   bool blocked = false;
   double nearest = std::numeric_limits<double>::infinity();  ///< distance along the ray
+  std::uint32_t triangle = 0;                                ///< the nearest, if blocked
   /// How near the ray comes to the border of any triangle in front of it, in barycentric units
   /// (smaller for triangles seen edge-on). A single precision ray may differ below ~1e-5.
   double margin = std::numeric_limits<double>::infinity();
 };
 
-inline RayResult trace(const Visibility& visibility, const Vec3& origin, const Vec3& direction) {
+/// Only triangles for which `counts(number)` holds are there.
+template <typename Counts>
+RayResult trace(const Visibility& visibility, const Vec3& origin, const Vec3& direction,
+                const Counts& counts) {
   RayResult result;
   for (std::uint32_t t = 0; t < visibility.triangle_count(); ++t) {
+    if (!counts(t)) continue;
     const Vec3 a = visibility.corner(t, 0);
     const Vec3 e1 = visibility.corner(t, 1) - a, e2 = visibility.corner(t, 2) - a;
     const Vec3 p = cross(direction, e2);
@@ -43,10 +48,14 @@ inline RayResult trace(const Visibility& visibility, const Vec3& origin, const V
     result.margin = std::min(result.margin, std::abs(inside) * std::min(1.0, edge_on));
     if (inside > 0) {
       result.blocked = true;
-      result.nearest = std::min(result.nearest, distance);
+      if (distance < result.nearest) result.nearest = distance, result.triangle = t;
     }
   }
   return result;
+}
+
+inline RayResult trace(const Visibility& visibility, const Vec3& origin, const Vec3& direction) {
+  return trace(visibility, origin, direction, [](std::uint32_t) { return true; });
 }
 
 }  // namespace haarlight::reference
