@@ -58,6 +58,11 @@ std::vector<TexelPlace> texel_places(int count) {
   return places;
 }
 
+std::size_t texel_of(const Vec3& direction, int n) {
+  const CubePoint p = cube_point(direction);
+  return cube_index(p.face, cube_texel(p.u, n), cube_texel(p.v, n), n);
+}
+
 DirectionTable::DirectionTable(int face_size, int samples_per_texel)
     : n(face_size), samples(samples_per_texel) {
   const auto size = static_cast<std::size_t>(n);

@@ -21,6 +21,9 @@ struct TexelPlace {
 /// transport differ by what the scene does and not by noise, which would not compress.
 std::vector<TexelPlace> texel_places(int count);
 
+/// Index of the texel of an n x n cube map that a direction falls into.
+std::size_t texel_of(const Vec3& direction, int n);
+
 /// Directions of all texels of a cube map with `samples` each, and what is needed to trace the
 /// first of each eight at a time. The same for every shading point; immutable.
 struct DirectionTable {

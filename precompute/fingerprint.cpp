@@ -42,6 +42,10 @@ void add_camera(ContentHash& hash, const Camera& camera) {
 void add_options(ContentHash& hash, const TraceOptions& options) {
   hash.add(options.face_size), hash.add(options.spp), hash.add(options.adaptive);
   hash.add(options.pixel_samples);
+  const Effects& e = options.effects;
+  hash.add(e.shadows), hash.add(e.bounces), hash.add(e.gloss), hash.add(e.specular);
+  hash.add(e.caustics), hash.add(e.color);
+  hash.add(options.noise), hash.add(options.paths), hash.add(options.seed);
 }
 
 void add_options(ContentHash& hash, const RunOptions& options) { hash.add(options.error); }

@@ -2,8 +2,6 @@
 
 #include "precompute/picture_tiles.h"
 
-#include <vector>
-
 namespace haarlight {
 namespace {
 
@@ -12,15 +10,16 @@ class PictureWorker : public TileSource::Worker {
   PictureWorker(const TileTracer& tracer, int width) : tracer_(tracer), width_(width) {}
 
   void trace(std::span<const std::uint32_t> outputs, TileRows& rows) override {
-    tracer_.trace(outputs, scratch_, rows, counts);
+    tracer_.trace(outputs, scratch_, rows, counts, &noise);
   }
 
   bool shows_scene(std::span<const std::uint32_t> outputs) override {
     for (const std::size_t row : {0u, 21u, 42u, 63u}) {  // one a block
       if (outputs[row] == kNoOutput) continue;
       const int pixel = static_cast<int>(outputs[row]);
-      tracer_.pixels().sample(pixel % width_, pixel / width_, points_, counts);
-      if (!points_.empty()) return true;
+      glance_.clear();
+      if (tracer_.pixels().sample(pixel % width_, pixel / width_, 0, glance_, counts) > 0)
+        return true;
     }
     return false;
   }
@@ -29,7 +28,7 @@ class PictureWorker : public TileSource::Worker {
   const TileTracer& tracer_;
   int width_;
   TileTracer::Scratch scratch_;
-  std::vector<PixelPoint> points_;
+  TileReceivers glance_;
 };
 
 }  // namespace

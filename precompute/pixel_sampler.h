@@ -1,42 +1,48 @@
-// One pixel -> the points whose light it shows.
+// One pixel -> the receivers whose light it shows.
 
 #pragma once
 
-#include <vector>
+#include <cstdint>
 
 #include "core/camera.h"
-#include "core/rgb.h"
+#include "precompute/effects.h"
 #include "precompute/point_tracer.h"
+#include "precompute/receiver.h"
 #include "precompute/scene.h"
 #include "precompute/visibility.h"
 
 namespace haarlight {
 
-/// A point seen in a pixel.
-struct PixelPoint {
-  ShadingPoint point;
-  double weight = 0;  ///< share of the pixel, (0, 1]
-  Rgb albedo;
-  Rgb specular;
-};
-
 /// Finds what pixels see through `samples` stratified places each (1, 4 or 16), jittered by a hash
-/// of pixel and sample. Immutable, shared by all threads; keeps references.
+/// of pixel and sample, through mirrors and glass where there are. Immutable, shared by all
+/// threads; keeps references.
 class PixelSampler {
  public:
-  PixelSampler(const Scene& scene, const Visibility& visibility, const Camera& camera, int samples);
+  PixelSampler(const Scene& scene, const Visibility& visibility, const Camera& camera, int samples,
+               const Effects& effects);
 
-  /// The points of pixel (x, y), replacing what `points` holds. The weights add up to the share of
-  /// the pixel that the scene covers. Where all hits lie on one smooth piece of surface - the same
-  /// material, normals within 8 degrees, less than the width of a pixel off its plane - one point
-  /// in the middle stands for all, with their mean albedo: light on it changes as slowly as its
-  /// normal, and a ray in the middle is worth more than several anywhere.
-  void sample(int x, int y, std::vector<PixelPoint>& points, RayCounts& counts) const;
+  /// Appends the receivers and escapes of pixel (x, y) as row `row`; returns the share of the pixel
+  /// that the scene covers.
+  ///
+  /// Where all hits lie on one smooth piece of surface - the same material without mirror or glass,
+  /// normals within 8 degrees, less than the width of a pixel off its plane - one receiver in the
+  /// middle stands for all, with their mean colours: light on it changes as slowly as its normal,
+  /// and a ray in the middle is worth more than several anywhere. Where there are mirrors or glass,
+  /// a pixel is looked at through at least 16 places, since what leaves the scene by way of them
+  /// costs little; every fourth of them gives receivers.
+  double sample(int x, int y, std::uint32_t row, TileReceivers& tile, RayCounts& counts) const;
 
  private:
+  struct Seen;
+  bool shoot(double px, double py, Seen& seen, RayCounts& counts) const;
+  void add(const Seen& seen, double weight, std::uint32_t row, TileReceivers& tile) const;
+  void look_through(const Seen& seen, double weight, double receiver_weight, std::uint64_t key,
+                    std::uint32_t row, TileReceivers& tile, RayCounts& counts) const;
+
   const Scene& scene_;
   const Visibility& visibility_;
   Camera camera_;
+  Effects effects_;
   Vec3 eye_;            // local
   int side_;            // samples on an axis
   double pixel_width_;  // of a pixel at distance 1, in the middle of the picture

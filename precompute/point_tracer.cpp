@@ -9,12 +9,17 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <optional>
 
-#include "precompute/phong_lobe.h"
+#include "precompute/glossy_lobe.h"
+#include "precompute/random.h"
+#include "precompute/specular_path.h"
 
 namespace haarlight {
 namespace {
+
+constexpr int kLobeDraws = 256;
 
 struct FloatVec {
   float x, y, z;
@@ -57,8 +62,22 @@ unsigned lanes_above(const float* x, const float* y, const float* z, const Float
 
 }  // namespace
 
-PointTracer::PointTracer(const Visibility& visibility, const DirectionTable& table, bool adaptive)
-    : visibility_(visibility), table_(table), adaptive_(adaptive) {
+ShadingPoint shading_point(const Receiver& receiver) {
+  ShadingPoint point;
+  const Bsdf& b = receiver.bsdf;
+  const Vec3 origin = receiver.position + Visibility::kSurfaceOffset * b.geometric_normal;
+  point.origin = {static_cast<float>(origin.x), static_cast<float>(origin.y),
+                  static_cast<float>(origin.z)};
+  point.geometric_normal = b.geometric_normal;
+  point.normal = b.normal;
+  point.glossy = b.has_lobe();
+  point.bsdf = b;
+  return point;
+}
+
+PointTracer::PointTracer(const Visibility& visibility, const DirectionTable& table, bool adaptive,
+                         bool shadows)
+    : visibility_(visibility), table_(table), adaptive_(adaptive), shadows_(shadows) {
   const std::size_t words = (table.texels() + 63) / 64;
   const auto n = static_cast<std::size_t>(table.n);
   has_right_.assign(words, 0);
@@ -91,8 +110,11 @@ void PointTracer::first_pass(const ShadingPoint& point, PointScratch& scratch,
         if (touched != whole) set_lanes(scratch.refine, p, touched & ~whole);
         if (lanes == 0) continue;
       }
-      const unsigned blocked = visibility_.occluded8(point.origin, p.x, p.y, p.z, lanes);
-      counts.shadow += std::popcount(lanes);
+      unsigned blocked = 0;
+      if (shadows_) {
+        blocked = visibility_.occluded8(point.origin, p.x, p.y, p.z, lanes);
+        counts.shadow += std::popcount(lanes);
+      }
       set_lanes(scratch.known, p, lanes);
       set_lanes(scratch.visible, p, lanes & ~blocked);
     }
@@ -126,29 +148,31 @@ void PointTracer::mark_differences(PointScratch& scratch) const {
   }
 }
 
-void PointTracer::refine(const ShadingPoint& point, const PhongLobe* phong,
-                         std::span<float> lambert, std::span<float> lobe, PointScratch& scratch,
-                         RayCounts& counts) const {
+void PointTracer::refine(const ShadingPoint& point, const GlossyLobe* lobe, const PointRow& row,
+                         PointScratch& scratch, RayCounts& counts) const {
   const FloatVec normal(point.normal), geometric(point.geometric_normal);
   const auto samples = static_cast<std::size_t>(table_.samples);
   const auto inverse_pi = static_cast<float>(1 / kPi);
 
   // Rays of any texels wait here until there are eight; results are added in the order of arrival.
   alignas(32) float x[8] = {}, y[8] = {}, z[8] = {};
-  float lambert_part[8], lobe_part[8];
+  float diffuse_part[8], first_part[8], second_part[8];
   std::size_t texel_of[8];
   unsigned waiting = 0;
-  const auto add = [&](std::size_t texel, float lambert_weight, float lobe_weight) {
-    lambert[texel] += lambert_weight;
-    if (phong) lobe[texel] += lobe_weight;
+  const auto add = [&](std::size_t texel, float diffuse, float first, float second) {
+    row.diffuse[texel] += diffuse;
+    if (lobe) row.first[texel] += first, row.second[texel] += second;
   };
   const auto flush = [&] {
     if (waiting == 0) return;
     const unsigned lanes = (1u << waiting) - 1;
-    const unsigned blocked = visibility_.occluded8(point.origin, x, y, z, lanes);
-    counts.shadow += waiting;
+    unsigned blocked = 0;
+    if (shadows_) {
+      blocked = visibility_.occluded8(point.origin, x, y, z, lanes);
+      counts.shadow += waiting;
+    }
     for (unsigned i = 0; i < waiting; ++i) {
-      if (!(blocked >> i & 1u)) add(texel_of[i], lambert_part[i], lobe_part[i]);
+      if (!(blocked >> i & 1u)) add(texel_of[i], diffuse_part[i], first_part[i], second_part[i]);
     }
     waiting = 0;
   };
@@ -156,20 +180,22 @@ void PointTracer::refine(const ShadingPoint& point, const PhongLobe* phong,
   for (std::size_t w = 0; w < scratch.refine.size(); ++w) {
     for (std::uint64_t bits = scratch.refine[w]; bits != 0; bits &= bits - 1) {
       const std::size_t texel = 64 * w + static_cast<std::size_t>(std::countr_zero(bits));
-      const bool lit = phong && phong->reaches(texel);
-      if (lit) phong->weights(texel, scratch.lobe_weights);
+      const bool lit = lobe && lobe->reaches(texel);
+      if (lit) lobe->weights(texel, scratch.first_weights, scratch.second_weights);
       for (std::size_t s = 0; s < samples; ++s) {
         const DirectionTable::Sample& d = table_.sample[texel * samples + s];
         const float cosine = normal.dot(d.x, d.y, d.z);
         if (!(cosine > 0) || !(geometric.dot(d.x, d.y, d.z) > 0)) continue;
-        const float lambert_weight = cosine * d.solid_angle * inverse_pi;
-        const float lobe_weight = lit ? scratch.lobe_weights[s] : 0.0f;
+        const float diffuse = cosine * d.solid_angle * inverse_pi;
+        const float first = lit ? scratch.first_weights[s] : 0.0f;
+        const float second = lit ? scratch.second_weights[s] : 0.0f;
         if (s == 0) {  // traced in the first pass
-          if (get(scratch.visible, texel)) add(texel, lambert_weight, lobe_weight);
+          if (get(scratch.visible, texel)) add(texel, diffuse, first, second);
           continue;
         }
         x[waiting] = d.x, y[waiting] = d.y, z[waiting] = d.z;
-        lambert_part[waiting] = lambert_weight, lobe_part[waiting] = lobe_weight;
+        diffuse_part[waiting] = diffuse;
+        first_part[waiting] = first, second_part[waiting] = second;
         texel_of[waiting] = texel;
         if (++waiting == 8) flush();
       }
@@ -178,15 +204,55 @@ void PointTracer::refine(const ShadingPoint& point, const PhongLobe* phong,
   flush();
 }
 
-void PointTracer::trace(const ShadingPoint& point, std::span<float> lambert, std::span<float> lobe,
-                        PointScratch& scratch, RayCounts& counts) const {
+// A lobe between the samples of texels: even draws from it, each a ray of its own.
+void PointTracer::draw_lobe(const ShadingPoint& point, std::vector<Deposit>& deposits,
+                            RayCounts& counts) const {
+  constexpr double kShift[4] = {0.5, 0.5, 0, 0};
+  const Bsdf& b = point.bsdf;
+  alignas(32) float x[8] = {}, y[8] = {}, z[8] = {};
+  Deposit part[8];
+  unsigned waiting = 0;
+  const auto flush = [&] {
+    if (waiting == 0) return;
+    unsigned blocked = 0;
+    if (shadows_) {
+      blocked = visibility_.occluded8(point.origin, x, y, z, (1u << waiting) - 1);
+      counts.shadow += waiting;
+    }
+    for (unsigned i = 0; i < waiting; ++i) {
+      if (!(blocked >> i & 1u)) deposits.push_back(part[i]);
+    }
+    waiting = 0;
+  };
+  for (int i = 0; i < kLobeDraws; ++i) {
+    const EvenPoint u = even_point(static_cast<std::uint64_t>(i), kShift);
+    const auto draw = b.sample_lobe(u.value[0], u.value[1]);
+    if (!draw || !(dot(draw->direction, b.geometric_normal) > 0)) continue;
+    const Bsdf::LobeValues v = b.lobe_values(draw->direction);
+    part[waiting] = {
+        texel_of(draw->direction, table_.n),
+        (v.first * b.gloss_first + v.second * b.gloss_second) * (1 / (draw->pdf * kLobeDraws))};
+    x[waiting] = static_cast<float>(draw->direction.x);
+    y[waiting] = static_cast<float>(draw->direction.y);
+    z[waiting] = static_cast<float>(draw->direction.z);
+    if (++waiting == 8) flush();
+  }
+  flush();
+}
+
+void PointTracer::trace(const ShadingPoint& point, const PointRow& row, PointScratch& scratch,
+                        RayCounts& counts) const {
   const std::size_t words = (table_.texels() + 63) / 64;
   scratch.known.assign(words, 0);
   scratch.visible.assign(words, 0);
   scratch.refine.assign(words, 0);
-  scratch.lobe_weights.resize(static_cast<std::size_t>(table_.samples));
-  std::fill(lambert.begin(), lambert.end(), 0.0f);
-  if (point.glossy) std::fill(lobe.begin(), lobe.end(), 0.0f);
+  scratch.first_weights.resize(static_cast<std::size_t>(table_.samples));
+  scratch.second_weights.resize(static_cast<std::size_t>(table_.samples));
+  std::fill(row.diffuse.begin(), row.diffuse.end(), 0.0f);
+  if (point.glossy) {
+    std::fill(row.first.begin(), row.first.end(), 0.0f);
+    std::fill(row.second.begin(), row.second.end(), 0.0f);
+  }
   ++counts.points;
 
   first_pass(point, scratch, counts);
@@ -196,8 +262,8 @@ void PointTracer::trace(const ShadingPoint& point, std::span<float> lambert, std
     for (std::size_t w = 0; w < words; ++w) scratch.refine[w] |= scratch.known[w];
   }
 
-  std::optional<PhongLobe> phong;
-  if (point.glossy) phong.emplace(table_, point.mirror, point.normal, point.exponent);
+  std::optional<GlossyLobe> lobe;
+  if (point.glossy) lobe.emplace(table_, point.bsdf);
 
   // Texels wholly above both horizons, all of one visibility.
   const FloatVec normal(point.normal * (1 / kPi));
@@ -207,19 +273,130 @@ void PointTracer::trace(const ShadingPoint& point, std::span<float> lambert, std
     if (sure == 0) continue;
     for (std::size_t k = 64 * w; k < end; ++k) {
       const float whole = normal.dot(table_.moment_x[k], table_.moment_y[k], table_.moment_z[k]);
-      lambert[k] = (sure >> (k % 64) & 1) ? whole : 0.0f;
+      row.diffuse[k] = (sure >> (k % 64) & 1) ? whole : 0.0f;
     }
-    if (!phong) continue;
+    if (!lobe) continue;
     for (std::uint64_t bits = sure; bits != 0; bits &= bits - 1) {
       const std::size_t k = 64 * w + static_cast<std::size_t>(std::countr_zero(bits));
-      if (!phong->reaches(k)) continue;
-      phong->weights(k, scratch.lobe_weights);
-      float sum = 0;
-      for (const float part : scratch.lobe_weights) sum += part;
-      lobe[k] = sum;
+      if (!lobe->reaches(k)) continue;
+      lobe->weights(k, scratch.first_weights, scratch.second_weights);
+      float first = 0, second = 0;
+      for (const float part : scratch.first_weights) first += part;
+      for (const float part : scratch.second_weights) second += part;
+      row.first[k] = first;
+      row.second[k] = second;
     }
   }
-  refine(point, phong ? &*phong : nullptr, lambert, lobe, scratch, counts);
+  refine(point, lobe ? &*lobe : nullptr, row, scratch, counts);
+
+  if (point.bsdf.coat_f0 > 0) {  // changes slowly: once a texel
+    const auto samples = static_cast<std::size_t>(table_.samples);
+    for (std::size_t k = 0; k < table_.texels(); ++k) {
+      if (row.diffuse[k] == 0) continue;
+      const DirectionTable::Sample& d = table_.sample[k * samples];
+      const Vec3 w{static_cast<double>(d.x), static_cast<double>(d.y), static_cast<double>(d.z)};
+      const double cosine = std::max(dot(point.normal, w), 1e-3);
+      const Vec3 above = w + (cosine - dot(point.normal, w)) * point.normal;
+      row.diffuse[k] *=
+          static_cast<float>(point.bsdf.diffuse_in(above) * kPi / dot(point.normal, above));
+    }
+  }
+  if (lobe && lobe->is_narrow() && row.deposits) draw_lobe(point, *row.deposits, counts);
+}
+
+void PointTracer::trace(const ShadingPoint& point, std::span<float> lambert, std::span<float> lobe,
+                        PointScratch& scratch, RayCounts& counts) const {
+  if (point.glossy) scratch.second.resize(table_.texels());
+  PointRow row;
+  row.diffuse = lambert;
+  row.first = lobe;
+  row.second = scratch.second;
+  trace(point, row, scratch, counts);
+}
+
+void PointTracer::trace_caustics(const Scene& scene, const ShadingPoint& point,
+                                 PointScratch& scratch, std::vector<Deposit>& deposits,
+                                 RayCounts& counts) const {
+  const Bsdf& b = point.bsdf;
+  const auto samples = static_cast<std::size_t>(table_.samples);
+  const Vec3 origin{static_cast<double>(point.origin[0]), static_cast<double>(point.origin[1]),
+                    static_cast<double>(point.origin[2])};
+  std::optional<GlossyLobe> lobe;
+  if (point.glossy) lobe.emplace(table_, b);
+
+  // What comes along `w`, by way of the mirror or glass nearest there, times `value`.
+  const auto follow = [&](const Vec3& w, const RgbD& value, std::uint64_t key) {
+    ++counts.specular;
+    const auto hit = surface_hit(scene, visibility_, origin, w);
+    if (!hit) return;
+    const Bsdf met = bsdf_at(scene, *hit);
+    if (met.delta_count == 0) return;
+    PathRandom random(key);
+    const PathEnd end =
+        follow_specular(scene, visibility_, *hit, met, AtMixed::pass, random, counts.specular);
+    if (end.hit || !(luminance(end.weight) > 0)) return;
+    deposits.push_back({texel_of(end.direction, table_.n), value * end.weight});
+  };
+
+  alignas(32) float x[8] = {}, y[8] = {}, z[8] = {};
+  RgbD value[8];
+  std::uint64_t key[8] = {};
+  unsigned waiting = 0;
+  const auto flush = [&] {
+    if (waiting == 0) return;
+    const unsigned lanes = (1u << waiting) - 1;
+    counts.specular += waiting;
+    const unsigned met = visibility_.occluded8(point.origin, x, y, z, lanes, Visibility::kSpecular);
+    for (unsigned i = 0; i < waiting; ++i) {
+      if (met >> i & 1u) {
+        follow({static_cast<double>(x[i]), static_cast<double>(y[i]), static_cast<double>(z[i])},
+               value[i], key[i]);
+      }
+    }
+    waiting = 0;
+  };
+  const RgbD out = b.diffuse_out(b.to_viewer);
+  const auto wait = [&](const Vec3& w, const RgbD& v, std::uint64_t k) {
+    x[waiting] = static_cast<float>(w.x), y[waiting] = static_cast<float>(w.y);
+    z[waiting] = static_cast<float>(w.z);
+    value[waiting] = v, key[waiting] = k;
+    if (++waiting == 8) flush();
+  };
+  for (std::size_t w = 0; w < scratch.known.size(); ++w) {
+    const std::uint64_t open = (scratch.known[w] & ~scratch.visible[w]) | scratch.refine[w];
+    for (std::uint64_t bits = open; bits != 0; bits &= bits - 1) {
+      const std::size_t texel = 64 * w + static_cast<std::size_t>(std::countr_zero(bits));
+      const bool lit = lobe && lobe->reaches(texel);
+      if (lit) lobe->weights(texel, scratch.first_weights, scratch.second_weights);
+      for (std::size_t s = 0; s < samples; ++s) {
+        const DirectionTable::Sample& d = table_.sample[texel * samples + s];
+        const Vec3 direction{static_cast<double>(d.x), static_cast<double>(d.y),
+                             static_cast<double>(d.z)};
+        if (!(dot(direction, point.normal) > 0) || !(dot(direction, point.geometric_normal) > 0)) {
+          continue;
+        }
+        RgbD v = out * (b.diffuse_in(direction) * static_cast<double>(d.solid_angle));
+        if (lit) {
+          v += static_cast<double>(scratch.first_weights[s]) * b.gloss_first +
+               static_cast<double>(scratch.second_weights[s]) * b.gloss_second;
+        }
+        if (l1_norm(v) > 0) wait(direction, v, mix_bits(texel, s));
+      }
+    }
+  }
+  flush();
+  if (!lobe || !lobe->is_narrow()) return;
+  constexpr double kShift[4] = {0.5, 0.5, 0, 0};
+  for (int i = 0; i < kLobeDraws; ++i) {
+    const EvenPoint u = even_point(static_cast<std::uint64_t>(i), kShift);
+    const auto draw = b.sample_lobe(u.value[0], u.value[1]);
+    if (!draw || !(dot(draw->direction, b.geometric_normal) > 0)) continue;
+    const Bsdf::LobeValues v = b.lobe_values(draw->direction);
+    wait(draw->direction,
+         (v.first * b.gloss_first + v.second * b.gloss_second) * (1 / (draw->pdf * kLobeDraws)),
+         mix_bits(table_.texels(), static_cast<std::uint64_t>(i)));
+  }
+  flush();
 }
 
 }  // namespace haarlight

@@ -24,8 +24,11 @@ std::string meta_json(const Scene& scene, const PrecomputeOptions& options) {
                               {"spp", t.spp},
                               {"adaptive", t.adaptive},
                               {"pixel_samples", t.pixel_samples},
-                              {"error", options.error}}},
-                            {"effects", {"direct", "shadows"}}};
+                              {"error", options.error},
+                              {"noise", t.noise},
+                              {"paths", t.paths},
+                              {"seed", t.seed}}},
+                            {"effects", to_string(t.effects)}};
   return meta.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 

@@ -139,20 +139,4 @@ SurfaceHit surface_at(const Scene& scene, const Visibility& visibility, const Vi
   return surface;
 }
 
-ShadingPoint shading_point(const Scene& scene, const SurfaceHit& hit) {
-  ShadingPoint point;
-  const Vec3 origin = hit.position + Visibility::kSurfaceOffset * hit.geometric_normal;
-  point.origin = {static_cast<float>(origin.x), static_cast<float>(origin.y),
-                  static_cast<float>(origin.z)};
-  point.geometric_normal = hit.geometric_normal;
-  point.normal = hit.normal;
-  const Material& material = scene.material[hit.material];
-  point.glossy = l1_norm(material.specular) > 0;
-  if (point.glossy) {
-    point.mirror = normalize(2 * dot(hit.normal, hit.to_viewer) * hit.normal - hit.to_viewer);
-    point.exponent = static_cast<double>(material.exponent);
-  }
-  return point;
-}
-
 }  // namespace haarlight

@@ -7,7 +7,6 @@
 
 #include "core/rgb.h"
 #include "core/vec.h"
-#include "precompute/point_tracer.h"
 #include "precompute/scene.h"
 #include "precompute/visibility.h"
 
@@ -37,8 +36,5 @@ std::optional<SurfaceHit> surface_hit(const Scene& scene, const Visibility& visi
 /// 2.0, 3.9.3, in the frame that the texture coordinates of the triangle span.
 SurfaceHit surface_at(const Scene& scene, const Visibility& visibility, const Visibility::Hit& hit,
                       const Vec3& direction);
-
-/// Where light is gathered for a hit: just off the surface, with the lobe of its material.
-ShadingPoint shading_point(const Scene& scene, const SurfaceHit& hit);
 
 }  // namespace haarlight

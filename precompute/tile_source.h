@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 
+#include "precompute/interreflection.h"
 #include "precompute/point_tracer.h"
 #include "prt/transport_writer.h"
 #include "wavelet/haar.h"
@@ -27,6 +28,7 @@ class TileSource {
     virtual bool shows_scene(std::span<const std::uint32_t> outputs) = 0;
 
     RayCounts counts;
+    TileNoise noise;
     double transform_seconds = 0;  ///< part of trace(): the wavelet transform
   };
 

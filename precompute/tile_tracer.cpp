@@ -1,53 +1,43 @@
-// One 8x8 pixel tile -> its exact rows of the transport.
+// The receivers of one tile -> its exact rows of the transport.
 
 #include "precompute/tile_tracer.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 
 #include "core/error.h"
+#include "precompute/row_color.h"
 
 namespace haarlight {
 namespace {
 
-double dot_rgb(const RgbD& a, const RgbD& b) { return a.r * b.r + a.g * b.g + a.b * b.b; }
-double largest(const RgbD& c) { return std::max({std::abs(c.r), std::abs(c.g), std::abs(c.b)}); }
+constexpr auto kRows = static_cast<std::size_t>(kTileRows);
 
-// The one colour that the BRDFs of a pixel share: their weighted mean reflectance.
-RgbD shared_color(const std::vector<PixelPoint>& points) {
-  RgbD sum;
-  double weight = 0;
-  for (const PixelPoint& p : points) {
-    sum += p.weight * (RgbD(p.albedo) + RgbD(p.specular));
-    weight += p.weight;
-  }
-  return weight > 0 ? sum * (1 / weight) : RgbD{};
+double channel(const RgbD& c, std::size_t i) { return i == 0 ? c.r : i == 1 ? c.g : c.b; }
+
+// The colours of a receiver's parts as its row shows them.
+std::array<RgbD, 3> part_colors(const Receiver& r) {
+  const Bsdf& b = r.bsdf;
+  return {r.weight * b.diffuse_out(b.to_viewer), b.has_lobe() ? r.weight * b.gloss_first : RgbD{},
+          b.has_lobe() ? r.weight * b.gloss_second : RgbD{}};
 }
 
-// How many times `base` a colour is, in the least squares sense.
-double multiple_of(const RgbD& color, const RgbD& base) {
-  const double square = dot_rgb(base, base);
-  return square > 0 ? dot_rgb(color, base) / square : 0;
-}
+// Whether the row's colour cannot be told from the colours of its parts: Fresnel mixes them.
+bool colors_vary(const Receiver& r) { return r.bsdf.lobe == Bsdf::Lobe::ggx; }
 
-bool is_multiple(const RgbD& color, const RgbD& base) {
-  return largest(color - base * multiple_of(color, base)) <= 0.01 * largest(base);
-}
-
-bool is_grey(const std::vector<PixelPoint>& points) {
-  const RgbD base = shared_color(points);
-  return std::all_of(points.begin(), points.end(), [&](const PixelPoint& p) {
-    return is_multiple(RgbD(p.albedo), base) && is_multiple(RgbD(p.specular), base);
-  });
+const TraceOptions& checked(const TraceOptions& options) {
+  check(options);
+  return options;
 }
 
 }  // namespace
 
 void check(const TraceOptions& options) {
-  const auto refuse = [](const char* name, int value, const char* wanted) {
+  const auto refuse = [](const char* name, auto value, const char* wanted) {
     throw Error(ErrorKind::invalid_argument,
                 fmt::format("{} is {}, expected {}", name, value, wanted));
   };
@@ -59,76 +49,191 @@ void check(const TraceOptions& options) {
   if (options.pixel_samples != 1 && options.pixel_samples != 4 && options.pixel_samples != 16) {
     refuse("pixel samples", options.pixel_samples, "1, 4 or 16");
   }
+  if (options.effects.bounces < 0 || options.effects.bounces > kMostBounces) {
+    refuse("bounces", options.effects.bounces, "0 to 64");
+  }
+  if (options.effects.bounces > 0 && !options.effects.shadows) {
+    refuse("bounces", options.effects.bounces,
+           "0 without shadows: light that passes through "
+           "surfaces is not reflected by them");
+  }
+  if (!(options.noise > 0) || !(options.noise <= 1)) {
+    refuse("noise", options.noise, "above 0 and at most 1");
+  }
+  if (options.paths < 1 || options.paths > 1 << 20) refuse("paths", options.paths, "1 to 1048576");
 }
 
-namespace {
-
-const TraceOptions& checked(const TraceOptions& options) {
-  check(options);
-  return options;
+TileTracer::TileTracer(const Scene& scene, const Visibility& visibility,
+                       const TraceOptions& options)
+    : scene_(scene),
+      visibility_(visibility),
+      options_(checked(options)),
+      layout_(options.face_size),
+      table_(options.face_size, options.spp),
+      points_(visibility, table_, options.adaptive, options.effects.shadows) {
+  if (options.effects.bounces > 0) {
+    paths_.emplace(scene, visibility, table_, options.effects, options.seed);
+  }
 }
-
-}  // namespace
 
 TileTracer::TileTracer(const Scene& scene, const Visibility& visibility, const Camera& camera,
                        const TraceOptions& options)
-    : layout_(checked(options).face_size),
-      width_(camera.width),
-      table_(options.face_size, options.spp),
-      pixels_(scene, visibility, camera, options.pixel_samples),
-      points_(visibility, table_, options.adaptive) {}
+    : TileTracer(scene, visibility, options) {
+  width_ = camera.width;
+  pixels_.emplace(scene, visibility, camera, options.pixel_samples, options.effects);
+}
 
-void TileTracer::trace(std::span<const std::uint32_t> outputs, Scratch& scratch, TileRows& tile,
-                       RayCounts& counts) const {
-  const auto size = static_cast<std::size_t>(layout_.size());
-  scratch.pixels.resize(kTileRows);
-  scratch.lambert.resize(size);
-  scratch.lobe.resize(size);
-
-  // What each pixel sees, and which blocks need three channels.
-  tile.rgb_blocks = 0;
-  tile.color.assign(kTileRows, Rgb{1, 1, 1});
-  tile.coverage.assign(kTileRows, 0.0f);
-  for (std::size_t row = 0; row < kTileRows; ++row) {
-    std::vector<PixelPoint>& points = scratch.pixels[row];
-    points.clear();
+void TileTracer::find_receivers(std::span<const std::uint32_t> outputs, TileReceivers& receivers,
+                                RayCounts& counts) const {
+  receivers.clear();
+  receivers.coverage.assign(kRows, 0.0f);
+  for (std::size_t row = 0; row < kRows; ++row) {
     if (outputs[row] == kNoOutput) continue;
     const auto output = static_cast<int>(outputs[row]);
-    pixels_.sample(output % width_, output / width_, points, counts);
-    double coverage = 0;
-    for (const PixelPoint& p : points) coverage += p.weight;
-    tile.coverage[row] = static_cast<float>(coverage);
-    if (!is_grey(points)) tile.rgb_blocks |= 1u << (row / kBlockRows);
+    receivers.coverage[row] = static_cast<float>(pixels_->sample(
+        output % width_, output / width_, static_cast<std::uint32_t>(row), receivers, counts));
   }
+}
 
-  const std::size_t channels = tile.rgb_blocks == 0 ? 1 : 3;
-  tile.values.assign(channels * kTileRows * size, 0.0f);
-  for (std::size_t row = 0; row < kTileRows; ++row) {
-    const std::vector<PixelPoint>& points = scratch.pixels[row];
-    if (points.empty()) continue;
-    const bool rgb = (tile.rgb_blocks >> (row / kBlockRows) & 1u) != 0;
-    const RgbD base = shared_color(points);
-    if (!rgb) tile.color[row] = Rgb(base);
-    const std::size_t row_channels = rgb ? 3 : 1;
-    scratch.texels.assign(row_channels * size, 0.0f);
-    for (const PixelPoint& p : points) {
-      points_.trace(p.point, scratch.lambert, scratch.lobe, scratch.point, counts);
-      for (std::size_t c = 0; c < row_channels; ++c) {
-        const auto factor = [&](const RgbD& color) {
-          if (!rgb) return multiple_of(color, base);
-          return c == 0 ? color.r : c == 1 ? color.g : color.b;
-        };
-        const auto diffuse = static_cast<float>(p.weight * factor(RgbD(p.albedo)));
-        float* sum = scratch.texels.data() + c * size;
-        for (std::size_t k = 0; k < size; ++k) sum[k] += diffuse * scratch.lambert[k];
-        if (!p.point.glossy) continue;
-        const auto gloss = static_cast<float>(p.weight * factor(RgbD(p.specular)));
-        for (std::size_t k = 0; k < size; ++k) sum[k] += gloss * scratch.lobe[k];
+void TileTracer::trace(std::span<const std::uint32_t> outputs, Scratch& scratch, TileRows& tile,
+                       RayCounts& counts, TileNoise* noise) const {
+  find_receivers(outputs, scratch.receivers, counts);
+  trace(scratch.receivers, scratch, tile, counts, noise);
+}
+
+// What reaches a receiver directly, in each of `channels`: three, or one grey in units of `base`.
+void TileTracer::add_direct(const Receiver& receiver, Scratch& scratch,
+                            std::span<float* const> channels, const RgbD& base,
+                            RayCounts& counts) const {
+  const auto size = static_cast<std::size_t>(layout_.size());
+  const ShadingPoint point = shading_point(receiver);
+  const std::array<RgbD, 3> color = part_colors(receiver);
+  const bool second = l1_norm(color[2]) > 0;
+  scratch.deposits.clear();
+  points_.trace(point, {scratch.diffuse, scratch.first, scratch.second, &scratch.deposits},
+                scratch.point, counts);
+  if (options_.effects.caustics && options_.effects.shadows && visibility_.has_specular()) {
+    points_.trace_caustics(scene_, point, scratch.point, scratch.deposits, counts);
+  }
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    const auto factor = [&](const RgbD& value) {
+      return static_cast<float>(channels.size() == 1 ? multiple_of(value, base)
+                                                     : channel(value, c));
+    };
+    float* sum = channels[c];
+    if (const float f = factor(color[0]); f != 0) {
+      for (std::size_t k = 0; k < size; ++k) sum[k] += f * scratch.diffuse[k];
+    }
+    if (point.glossy) {
+      const float f = factor(color[1]);
+      for (std::size_t k = 0; k < size; ++k) sum[k] += f * scratch.first[k];
+      if (second) {
+        const float g = factor(color[2]);
+        for (std::size_t k = 0; k < size; ++k) sum[k] += g * scratch.second[k];
       }
     }
-    for (std::size_t c = 0; c < row_channels; ++c) {
-      haar_forward(layout_, std::span<const float>(scratch.texels).subspan(c * size, size),
-                   std::span<float>(tile.values).subspan((c * kTileRows + row) * size, size));
+    for (const Deposit& d : scratch.deposits) sum[d.texel] += factor(receiver.weight * d.value);
+  }
+}
+
+void TileTracer::trace(const TileReceivers& receivers, Scratch& scratch, TileRows& tile,
+                       RayCounts& counts, TileNoise* noise) const {
+  const auto size = static_cast<std::size_t>(layout_.size());
+  scratch.diffuse.resize(size);
+  scratch.first.resize(size);
+  scratch.second.resize(size);
+  scratch.of_row.resize(kRows);
+  for (auto& list : scratch.of_row) list.clear();
+  for (std::size_t i = 0; i < receivers.receivers.size(); ++i) {
+    scratch.of_row[receivers.receivers[i].row].push_back(i);
+  }
+  tile.color.assign(kRows, Rgb{1, 1, 1});
+  tile.coverage = receivers.coverage;
+
+  // Rows whose colour is known before they are traced: all parts are multiples of one.
+  const bool mixed = paths_.has_value() || (options_.effects.caustics && options_.effects.shadows &&
+                                            visibility_.has_specular());
+  std::array<bool, kRows> known{};
+  std::array<RgbD, kRows> base{};
+  for (std::size_t row = 0; row < kRows; ++row) {
+    RgbD sum;
+    double weight = 0;
+    for (const std::size_t i : scratch.of_row[row]) {
+      for (const RgbD& c : part_colors(receivers.receivers[i])) sum += c;
+      weight += luminance(receivers.receivers[i].weight);
+    }
+    base[row] = weight > 0 ? sum * (1 / weight) : RgbD{};
+    known[row] = !mixed;
+    for (const std::size_t i : scratch.of_row[row]) {
+      if (colors_vary(receivers.receivers[i])) known[row] = false;
+      for (const RgbD& c : part_colors(receivers.receivers[i])) {
+        if (!is_multiple(c, base[row])) known[row] = false;
+      }
+    }
+  }
+  for (const Escape& e : receivers.escapes) known[e.row] = false;
+  unsigned open_blocks = 0;  // rows of which are traced in three channels
+  for (std::size_t row = 0; row < kRows; ++row) {
+    if (!known[row]) open_blocks |= 1u << (row / kBlockRows);
+  }
+
+  // Direct light, [channel][row][texel].
+  const std::size_t channels = open_blocks == 0 ? 1 : 3;
+  scratch.texels.assign(channels * kRows * size, 0.0f);
+  const auto row_of = [&](std::size_t c, std::size_t row) {
+    return scratch.texels.data() + (c * kRows + row) * size;
+  };
+  for (std::size_t row = 0; row < kRows; ++row) {
+    const bool open = (open_blocks >> (row / kBlockRows) & 1u) != 0;
+    std::array<float*, 3> to{};
+    for (std::size_t c = 0; c < (open ? 3u : 1u); ++c) to[c] = row_of(c, row);
+    for (const std::size_t i : scratch.of_row[row]) {
+      add_direct(receivers.receivers[i], scratch, {to.data(), open ? 3u : 1u}, base[row], counts);
+    }
+    if (!open && !scratch.of_row[row].empty()) tile.color[row] = Rgb(base[row]);
+  }
+  for (const Escape& e : receivers.escapes) {
+    const std::size_t texel = texel_of(e.direction, layout_.face_size());
+    for (std::size_t c = 0; c < 3; ++c) {
+      row_of(c, e.row)[texel] += static_cast<float>(channel(e.weight, c));
+    }
+  }
+
+  if (paths_) {
+    TileNoise own;
+    paths_->add(receivers, {options_.noise, options_.paths}, *scratch.paths, scratch.texels,
+                noise ? *noise : own, counts);
+  }
+
+  // Which of the open blocks are of one colour a row after all.
+  tile.rgb_blocks = 0;
+  std::array<RgbD, kRows> fit{};
+  for (std::size_t block = 0; block < kTileBlocks; ++block) {
+    if (!(open_blocks >> block & 1u)) continue;
+    bool grey = true;
+    for (std::size_t row = block * kBlockRows; row < (block + 1) * kBlockRows; ++row) {
+      const ColorFit found = fit_color(row_of(0, row), row_of(1, row), row_of(2, row), size);
+      fit[row] = found.color;
+      if (found.residual > 0.01) grey = false;
+    }
+    if (options_.effects.color && !grey) {
+      tile.rgb_blocks |= 1u << block;
+      continue;
+    }
+    for (std::size_t row = block * kBlockRows; row < (block + 1) * kBlockRows; ++row) {
+      to_grey(fit[row], row_of(0, row), row_of(1, row), row_of(2, row), size);
+      if (l1_norm(fit[row]) > 0) tile.color[row] = Rgb(fit[row]);
+    }
+  }
+
+  const std::size_t stored = tile.rgb_blocks == 0 ? 1 : 3;
+  tile.values.assign(stored * kRows * size, 0.0f);
+  for (std::size_t row = 0; row < kRows; ++row) {
+    if (receivers.coverage[row] <= 0) continue;
+    const bool rgb = (tile.rgb_blocks >> (row / kBlockRows) & 1u) != 0;
+    for (std::size_t c = 0; c < (rgb ? 3u : 1u); ++c) {
+      haar_forward(layout_, std::span<const float>(row_of(c, row), size),
+                   std::span<float>(tile.values).subspan((c * kRows + row) * size, size));
     }
   }
 }

@@ -37,6 +37,8 @@ class Visibility {
   Visibility& operator=(const Visibility&) = delete;
 
   Vec3 to_local(const Vec3& world) const { return (world - center_) * scale_; }
+  /// A local length in metres.
+  double to_world_length(double local) const { return local / scale_; }
 
   /// How far a ray's origin is moved off the surface it starts on, local units. Rounding an origin
   /// to float moves it by at most 2 u sqrt(3) and Embree's plane distance is wrong by a few u of

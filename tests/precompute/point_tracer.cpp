@@ -47,6 +47,17 @@ ShadingPoint point_at(const Visibility& visibility, const Vec3& world, const Vec
   return p;
 }
 
+// A Phong lobe about `mirror`.
+Bsdf phong_bsdf(const Vec3& normal, const Vec3& mirror, double exponent) {
+  Bsdf b;
+  b.geometric_normal = b.normal = normal;
+  b.to_viewer = 2 * dot(normal, mirror) * normal - mirror;
+  b.lobe = Bsdf::Lobe::phong;
+  b.width = exponent;
+  b.gloss_first = {1, 1, 1};
+  return b;
+}
+
 // A triangle far below a point at the origin, so that nothing above is in the way.
 Scene free_scene() {
   Scene scene = shapes::empty_scene();
@@ -158,8 +169,7 @@ TEST(PointTracer, ClosedBoxIsDark) {
   const Vec3 up{0, 1, 0};
   ShadingPoint point = point_at(visibility, {0.2, -1, 0.3}, up, up);
   point.glossy = true;
-  point.mirror = up;
-  point.exponent = 20;
+  point.bsdf = phong_bsdf(up, up, 20);
   for (const bool adaptive : {true, false}) {
     const Gathered g = gather(visibility, table, point, adaptive);
     for (const float t : g.lambert) EXPECT_EQ(t, 0.0f);
@@ -177,8 +187,7 @@ TEST(PointTracer, AdaptiveAgreesWithAllRays) {
   const Vec3 up{0, 1, 0};
   ShadingPoint point = point_at(visibility, {0, 0, 0}, up, normalize(Vec3{0.1, 1, 0}));
   point.glossy = true;
-  point.mirror = normalize(Vec3{0.3, 0.8, 0.1});
-  point.exponent = 60;
+  point.bsdf = phong_bsdf(point.normal, normalize(Vec3{0.3, 0.8, 0.1}), 60);
   const Gathered fast = gather(visibility, table, point, true);
   const Gathered full = gather(visibility, table, point, false);
   EXPECT_LT(fast.counts.shadow, full.counts.shadow / 2);
@@ -276,8 +285,7 @@ TEST(PointTracer, LobeUnderOpenSkyReturnsOne) {
   for (const double exponent : {5.0, 100.0, 10000.0}) {
     ShadingPoint point = point_at(visibility, {0, 0, 0}, up, up);
     point.glossy = true;
-    point.mirror = up;
-    point.exponent = exponent;
+    point.bsdf = phong_bsdf(up, up, exponent);
     EXPECT_NEAR(gather(visibility, table, point, true).lobe_sum(), 1, 0.01);
   }
 }

@@ -34,20 +34,6 @@ TEST(Surface, HitsLieOnTheSphereFacingTheViewer) {
   }
 }
 
-TEST(Surface, MirrorDirectionObeysTheLawOfReflection) {
-  Scene scene = shapes::empty_scene();
-  scene.material[0].specular = {0.5f, 0.5f, 0.5f};
-  shapes::add_quad(scene, {-1, 0, -1}, {0, 0, 2}, {2, 0, 0});
-  const Visibility visibility(scene);
-  const Vec3 towards = normalize(Vec3{0.3, -0.8, 0.1});
-  const auto hit = surface_hit(scene, visibility, visibility.to_local({-0.3, 0.8, -0.1}), towards);
-  ASSERT_TRUE(hit);
-  const ShadingPoint point = shading_point(scene, *hit);
-  EXPECT_TRUE(point.glossy);
-  EXPECT_NEAR(length(point.mirror - Vec3{towards.x, -towards.y, towards.z}), 0, 1e-12);
-  EXPECT_GT(point.origin[1], 0.0f);  // off the surface, on the viewer's side
-}
-
 TEST(Surface, BackSidesAreLitFromTheViewersSide) {
   Scene scene = shapes::empty_scene();
   shapes::add_quad(scene, {-1, 0, -1}, {0, 0, 2}, {2, 0, 0});  // faces up

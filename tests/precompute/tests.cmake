@@ -12,3 +12,7 @@ haarlight_test(precompute/tile_tracer haarlight_precompute)
 haarlight_test(precompute/visibility haarlight_precompute)
 target_compile_definitions(test_precompute_scene_import PRIVATE
   HAARLIGHT_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+haarlight_test(precompute/effects haarlight_precompute)
+haarlight_test(precompute/interreflection haarlight_precompute)
+haarlight_test(precompute/row_products haarlight_precompute)
+haarlight_test(precompute/sparse_directions haarlight_precompute)

@@ -85,12 +85,12 @@ TEST(TileTracer, RowsMatchBruteForce) {
     EXPECT_EQ(rows.color[row], (Rgb{0.5f, 0.5f, 0.5f}));
     // Normals are not the reference's business: those of the tracer's own hit.
     RayCounts counts;
-    std::vector<PixelPoint> points;
+    TileReceivers seen_by_tracer;
     TileTracer(scene, visibility, camera, options)
         .pixels()
-        .sample(pixel % 8, pixel / 8, points, counts);
-    ASSERT_EQ(points.size(), 1u);
-    const ShadingPoint& p = points[0].point;
+        .sample(pixel % 8, pixel / 8, 0, seen_by_tracer, counts);
+    ASSERT_EQ(seen_by_tracer.receivers.size(), 1u);
+    const ShadingPoint p = shading_point(seen_by_tracer.receivers[0]);
     const Vec3 origin{static_cast<double>(p.origin[0]), static_cast<double>(p.origin[1]),
                       static_cast<double>(p.origin[2])};
     EXPECT_NEAR(length(origin - (eye + seen.nearest * towards)), 0, 2e-5);
@@ -173,33 +173,33 @@ TEST(TileTracer, BlocksAreGreyWhereOneColorFactorsOut) {
   const TileRows shades = rows_of(scene, camera, options);
   EXPECT_EQ(shades.rgb_blocks, 0u);
 
+  // Two colours that see the same sky still are one grey row a pixel, whatever the mixture.
   scene.material[1].albedo = {0.1f, 0.2f, 0.8f};
-  const TileRows mixed = rows_of(scene, camera, options);
+  const TileRows level = rows_of(scene, camera, options);
+  EXPECT_EQ(level.rgb_blocks, 0u);
+
+  // A roof of two colours: what lies left and right of the ridge sees different skies.
+  Scene roof = scene;
+  for (const std::size_t v : {0u, 1u}) roof.position[v].y = -6;
+  for (const std::size_t v : {6u, 7u}) roof.position[v].y = -6;
+  const TileRows mixed = rows_of(roof, camera, options);
   EXPECT_NE(mixed.rgb_blocks, 0u);
   EXPECT_NE(mixed.rgb_blocks, 15u);
 
-  // Whatever the storage, a pixel under an even sky of 1 is its mean albedo: the ground sees all.
+  // Whatever the storage, a pixel of the level ground under an even sky of 1 is its mean albedo.
   const auto size = static_cast<std::size_t>(HaarLayout(8).size());
-  const auto even_sky = [&](const TileRows& rows, std::size_t row, std::size_t channel) {
+  for (std::size_t row = 0; row < kTileRows; ++row) {
     // Texel sum = n * (sum of the six scaling coefficients).
     double sum = 0;
     for (std::size_t face = 0; face < 6; ++face) {
-      sum += static_cast<double>(rows.values[(channel * kTileRows + row) * size + face]);
+      sum += 8 * static_cast<double>(level.values[row * size + face]);
     }
-    return 8 * sum;
-  };
-  for (std::size_t row = 0; row < kTileRows; ++row) {
-    if (!(mixed.rgb_blocks >> (row / kBlockRows) & 1u)) {
-      const Rgb c = mixed.color[row];
-      const bool left = c.r > 0.5f;
-      EXPECT_EQ(c, left ? scene.material[0].albedo : scene.material[1].albedo);
-      EXPECT_NEAR(even_sky(mixed, row, 0), 1, 0.01);
-    } else {
-      EXPECT_EQ(mixed.color[row], (Rgb{1, 1, 1}));
-      // r + b is 0.9 on both sides, g 0.2 on both.
-      EXPECT_NEAR(even_sky(mixed, row, 0) + even_sky(mixed, row, 2), 0.9, 0.01);
-      EXPECT_NEAR(even_sky(mixed, row, 1), 0.2, 0.002);
-    }
+    const RgbD shown = RgbD(level.color[row]) * sum;
+    // r + b is 0.9 on both sides, g 0.2 on both.
+    EXPECT_NEAR(shown.r + shown.b, 0.9, 0.01);
+    EXPECT_NEAR(shown.g, 0.2, 0.002);
+    EXPECT_TRUE(mixed.rgb_blocks >> (row / kBlockRows) & 1u ||
+                (mixed.color[row].r > 0.5f) != (mixed.color[row].b > 0.5f));
   }
 }
 
@@ -291,11 +291,26 @@ TEST(TileTracer, RefusesOptionsOutsideTheirRange) {
   };
   EXPECT_EQ(message({}), "");
   for (const int face : {0, 2, 48, 512, -64}) {
-    EXPECT_NE(message({.face_size = face}).find(std::to_string(face)), std::string::npos);
+    TraceOptions o;
+    o.face_size = face;
+    EXPECT_NE(message(o).find(std::to_string(face)), std::string::npos);
   }
-  EXPECT_NE(message({.spp = 0}).find("spp is 0"), std::string::npos);
-  EXPECT_NE(message({.spp = 65}), "");
-  EXPECT_NE(message({.pixel_samples = 5}).find("1, 4 or 16"), std::string::npos);
+  const auto with = [&](auto TraceOptions::*member, auto value) {
+    TraceOptions o;
+    o.*member = value;
+    return message(o);
+  };
+  EXPECT_NE(with(&TraceOptions::spp, 0).find("spp is 0"), std::string::npos);
+  EXPECT_NE(with(&TraceOptions::spp, 65), "");
+  EXPECT_NE(with(&TraceOptions::pixel_samples, 5).find("1, 4 or 16"), std::string::npos);
+  EXPECT_NE(with(&TraceOptions::noise, 0.0).find("above 0"), std::string::npos);
+  EXPECT_NE(with(&TraceOptions::paths, 0).find("paths is 0"), std::string::npos);
+  TraceOptions o;
+  o.effects.bounces = 65;
+  EXPECT_NE(message(o).find("bounces is 65"), std::string::npos);
+  o.effects.bounces = 2;
+  o.effects.shadows = false;
+  EXPECT_NE(message(o).find("without shadows"), std::string::npos);
 }
 
 }  // namespace

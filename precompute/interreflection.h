@@ -1,0 +1,83 @@
+// Light that reaches a tile's receivers by way of other surfaces.
+//
+// Paths go backwards. From a receiver x a direction is drawn by the cosine (or by its lobe); where
+// it meets a surface y, y looks for light from all directions by itself, as every later vertex of
+// the path does: a path is a handful of vertices that each hand a whole row of the sky on, not one
+// direction. What y sends to x by diffuse reflection it also sends to every other receiver of the
+// tile that sees it, weighted by the balance heuristic
+//     c(x) = f(x <- y) G(x, y) V(x, y) / (N sum over receivers x' of q(x') p(x' -> y)),
+// p the density with which x' would have found y, q the chance that x' was asked: unbiased, and
+// each receiver profits from the paths of all (Veach 1997, section 9.2; Bekaert and others 2002 for
+// the sharing). Lobes and single directions on the way serve the receiver they started from only.
+//
+// Vertices look into one sixteenth of the texels each (precompute/sparse_directions.h); so that a
+// tile's sum over paths is one small matrix product a phase: rows x paths times paths x texels.
+
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "precompute/effects.h"
+#include "precompute/point_tracer.h"
+#include "precompute/receiver.h"
+#include "precompute/scene.h"
+#include "precompute/sparse_directions.h"
+#include "precompute/visibility.h"
+#include "wavelet/haar.h"
+
+namespace haarlight {
+
+/// How noisy a tile's picture is under the built-in lightings; add up over tiles.
+struct TileNoise {
+  std::vector<double> variance;  ///< per lighting: of the picture, summed over rows and channels
+  std::vector<double> energy;    ///< per lighting: the picture squared, summed likewise
+  std::int64_t paths = 0;        ///< traced
+  void add(const TileNoise& other);
+  /// The largest relative noise, root of variance by energy, over the lightings; 0 without any.
+  double worst() const;
+};
+
+/// How long to go on.
+struct PathBudget {
+  double noise = 0.01;  ///< stop when the tile's worst() is at or below
+  int most = 4096;      ///< or after so many paths of each kind; rounded up to kPathBatch
+};
+
+inline constexpr int kPathBatch = 512;
+
+class Interreflection {
+ public:
+  /// Keeps references to scene, visibility and table.
+  Interreflection(const Scene& scene, const Visibility& visibility, const DirectionTable& table,
+                  const Effects& effects, std::uint64_t seed);
+  ~Interreflection();
+
+  struct Scratch;
+  static std::unique_ptr<Scratch, void (*)(Scratch*)> make_scratch();
+
+  /// Adds to `rows`, [channel][row][texel] with kTileRows rows of all texels, what reaches the
+  /// receivers after 1 to effects.bounces bounces. `rows` holds what reaches them directly, against
+  /// which noise is measured. All numbers depend on the receivers and the seed alone.
+  void add(const TileReceivers& tile, const PathBudget& budget, Scratch& scratch,
+           std::span<float> rows, TileNoise& noise, RayCounts& counts) const;
+
+ private:
+  class Batch;
+
+  const Scene& scene_;
+  const Visibility& visibility_;
+  Effects effects_;
+  std::uint64_t seed_;
+  HaarLayout layout_;
+  SparseDirections directions_;
+  double narrow_;                      // lobes below this half width are sampled, radians
+  std::vector<std::int32_t> slot_of_;  // per texel: phase * slots + slot
+  std::size_t lights_ = 0;
+  std::vector<float> light_;         // [phase][light][slot]
+  std::vector<float> light_texels_;  // [light][texel]
+};
+
+}  // namespace haarlight

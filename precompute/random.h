@@ -1,0 +1,50 @@
+// Random numbers without state: each is a hash of what it is for, so that no result depends on
+// threads, order or on what else is computed.
+
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+namespace haarlight {
+
+/// Hashes two numbers into 64 even bits (SplitMix64's finaliser).
+inline std::uint64_t mix_bits(std::uint64_t a, std::uint64_t b) {
+  std::uint64_t z = a * 0x9e3779b97f4a7c15u + b + 0x9e3779b97f4a7c15u;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+  return z ^ (z >> 31);
+}
+
+/// [0, 1).
+inline double unit_number(std::uint64_t bits) { return static_cast<double>(bits >> 11) * 0x1p-53; }
+
+/// The numbers of one path: a key says which path, next() walks along it.
+class PathRandom {
+ public:
+  explicit PathRandom(std::uint64_t key) : key_(key) {}
+  double next() { return unit_number(mix_bits(key_, counter_++)); }
+
+ private:
+  std::uint64_t key_, counter_ = 0;
+};
+
+/// Point `i` of the four-dimensional Kronecker sequence of the root of x^5 = x + 1, moved by
+/// `shift` (each [0, 1)): any run of it fills the cube evenly, and with a random shift each point
+/// by itself is uniform.
+struct EvenPoint {
+  double value[4];
+};
+inline EvenPoint even_point(std::uint64_t i, const double (&shift)[4]) {
+  constexpr double kRoot = 1.1673039782614187;
+  EvenPoint p{};
+  double step = 1;
+  for (int d = 0; d < 4; ++d) {
+    step /= kRoot;
+    const double x = shift[d] + static_cast<double>(i) * step;
+    p.value[d] = x - std::floor(x);
+  }
+  return p;
+}
+
+}  // namespace haarlight
