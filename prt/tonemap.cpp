@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/error.h"
@@ -52,6 +53,38 @@ Image tonemap(const Image& radiance, const TonemapOptions& options) {
         }
         return display(c);
       });
+  return result;
+}
+
+// Mikhailov 2019, "Turbo, An Improved Rainbow Colormap for Visualization": the polynomial fit,
+// which is of sRGB values.
+Rgb false_colour_of(double stops) {
+  const double x = std::clamp((stops + kFalseColourStops) / (2 * kFalseColourStops), 0.0, 1.0);
+  const auto polynomial = [x](const std::array<double, 6>& c) {
+    double sum = 0;
+    for (std::size_t i = c.size(); i-- > 0;) sum = sum * x + c[i];
+    const double encoded = std::clamp(sum, 0.0, 1.0);
+    return encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
+  };
+  return Rgb(RgbD(
+      polynomial({0.13572138, 4.61539260, -42.66032258, 132.13108234, -152.94239396, 59.28637943}),
+      polynomial({0.09140261, 2.19418839, 4.84296658, -14.18503333, 4.27729857, 2.82956604}),
+      polynomial(
+          {0.10667330, 12.64194608, -60.58204836, 110.36276771, -89.90310912, 27.34824973})));
+}
+
+Image false_colour(const Image& radiance, double exposure_ev) {
+  if (!std::isfinite(exposure_ev)) {
+    throw Error(ErrorKind::invalid_argument,
+                fmt::format("exposure is {} stops, expected a finite number", exposure_ev));
+  }
+  Image result(radiance.width, radiance.height);
+  std::transform(radiance.pixels.begin(), radiance.pixels.end(), result.pixels.begin(),
+                 [&](const Rgb& pixel) {
+                   const double y = luminance(RgbD(pixel));
+                   if (!(y > 0)) return Rgb{};
+                   return false_colour_of(std::log2(std::min(y, kWhite) / kMidGrey) + exposure_ev);
+                 });
   return result;
 }
 
