@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "apps/option_parsers.h"
@@ -18,6 +19,7 @@
 #include "prt/image_relighter.h"
 #include "prt/metrics_csv.h"
 #include "prt/motion_background.h"
+#include "prt/picture_relighter.h"
 #include "prt/relight_sequence.h"
 #include "prt/tonemap.h"
 #include "wavelet/projection.h"
@@ -48,6 +50,7 @@ struct RelightCommand {
  private:
   /// Options that are wrong only together.
   void check() const;
+  void check_kind(const Transport& scene) const;
   std::vector<Environment> load(const MotionRecording& replayed) const;
   std::vector<int> frames_to_save(int frames) const;
   void save(const SequenceFrame& frame, Image picture, double exposure) const;
@@ -87,6 +90,19 @@ void RelightCommand::check() const {
   }
 }
 
+void RelightCommand::check_kind(const Transport& scene) const {
+  if (scene.kind() == TransportKind::mesh) return;
+  if (sequence.orbit_degrees != 0) {
+    refuse_option("--orbit", fmt::format("{}", sequence.orbit_degrees),
+                  "none, since the transport is of one view and not of a mesh");
+  }
+  if (sequence.width > 0) {
+    refuse_option("--size", fmt::format("{}x{}", sequence.width, sequence.height),
+                  fmt::format("none, since the transport is of one view of {}x{} pixels",
+                              scene.width(), scene.height()));
+  }
+}
+
 std::vector<int> RelightCommand::frames_to_save(int count) const {
   if (folder.empty()) return {};
   if (!save_frames.empty()) return parse_frames("--save-frames", save_frames, count - 1);
@@ -118,6 +134,7 @@ void RelightCommand::run() const {
   const int frames = replayed ? static_cast<int>(replayed->frames.size()) : sequence.frames;
   const std::vector<int> saved = frames_to_save(frames);
   const Transport scene = Transport::open(transport);
+  check_kind(scene);
   MotionRecording plain;
   plain.environments.push_back(env);
   if (!env_to.empty()) plain.environments.push_back(env_to);
@@ -136,18 +153,20 @@ void RelightCommand::run() const {
     if (number == 0 && !exposure_ev && !saved.empty()) {
       const bool dark =
           replayed ? replayed->frames.front().start != FrameStart::exact : sequence.from_dark;
-      exposure = auto_exposure_ev(dark ? relight_once(scene, frame.target) : frame.picture);
+      exposure = auto_exposure_ev(
+          dark ? relight_picture_once(scene, frame.target, frame.view.camera) : frame.picture);
     }
     if (std::binary_search(saved.begin(), saved.end(), number)) {
       Image picture = frame.picture;
       if (no_background) {
         // The scene alone.
       } else if (replayed) {
-        composite_light_background(scene, replayed->frames[static_cast<std::size_t>(number)].light,
+        composite_light_background(frame.view,
+                                   replayed->frames[static_cast<std::size_t>(number)].light,
                                    environments, picture);
       } else {
-        composite_motion_background(scene, sequence.motion, number, environments.front(), second,
-                                    picture);
+        composite_motion_background(frame.view, sequence.motion, number, environments.front(),
+                                    second, picture);
       }
       save(frame, std::move(picture), exposure);
     }
@@ -209,6 +228,9 @@ Verb add_relight(CLI::App& verb) {
       ->group("Motion");
   add_integer(verb, "--frames", s.frames, 1, kMaxFrames, "frames in the sequence")->group("Motion");
   add_integer(verb, "--stop", s.motion.stop, 1, kMaxFrames, "frame at which the light rests")
+      ->group("Motion");
+  add_number(verb, "--orbit", s.orbit_degrees, -kMaxDegrees, kMaxDegrees,
+             "of a mesh: carry the camera round its middle, degrees")
       ->group("Motion");
 
   add_choice<LightingMethod>(verb, "--method", s.lighting.method,
@@ -274,6 +296,14 @@ Verb add_relight(CLI::App& verb) {
                             {"filmic", TonemapCurve::filmic}},
                            "curve of the PNGs")
       ->group("Output");
+  verb.add_option_function<std::string>(
+          "--size",
+          [&s](const std::string& text) {
+            std::tie(s.width, s.height) = parse_size("--size", text);
+          },
+          "of the pictures of a mesh, pixels, each 1 to 8192 [the file's]")
+      ->type_name("WxH")
+      ->group("Output");
   verb.add_flag("--no-background", c.no_background,
                 "leave out the environment behind the scene, in EXR and PNG")
       ->group("Output");
@@ -286,7 +316,7 @@ Verb add_relight(CLI::App& verb) {
   add_threads(verb)->group("Output");
 
   for (const char* name : {"--degrees", "--frames", "--stop", "--method", "--wavelets", "--weight",
-                           "--bands", "--from-dark"}) {
+                           "--bands", "--from-dark", "--orbit", "--size"}) {
     c.said_by_recording.push_back(verb.get_option(name));
   }
 
@@ -295,6 +325,7 @@ Verb add_relight(CLI::App& verb) {
       "tumble: about +Y by 2 D t, then about +X by 1.6 D t^2; swing: about +Y by 0.4 D sin(4 pi "
       "t);\n"
       "blend: (1 - t) A + t B; light: a disc light carried once round over 2 % of A.\n"
+      "--orbit carries a mesh's camera about +Y by its degrees times t, whatever the light does.\n"
       "A recording (FILE.json) says light, method, budget and weight of every frame itself.\n"
       "Metrics: frame, method, wavelets, weight, updates, resets (a digit a band, coarsest "
       "first),\n"
@@ -305,7 +336,8 @@ Verb add_relight(CLI::App& verb) {
       "  haarlight relight bunny.hlt --env lobby.exr --method pbi --wavelets 30 \\\n"
       "      --metrics m.csv --against-reference -o out/bunny --every 10\n"
       "  haarlight relight bunny.hlt --env day.exr --env-to night.hdr --motion blend -o out/dusk\n"
-      "  haarlight relight bunny.hlt --env lobby.exr --motion still --frames 1 -o out/one");
+      "  haarlight relight bunny.hlt --env lobby.exr --motion still --frames 1 -o out/one\n"
+      "  haarlight relight mesh.hlt --env lobby.exr --motion still --orbit 360 -o out/round");
   return [command] { command->run(); };
 }
 

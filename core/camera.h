@@ -43,4 +43,14 @@ inline Camera look_at(const Vec3& position, const Vec3& target, double vertical_
   return camera;
 }
 
+/// `camera` carried round the vertical axis through `center` by `radians`, right-handed about +Y,
+/// keeping `center` where it is in the picture. By 0 it is the same bits.
+inline Camera turned_about(Camera camera, const Vec3& center, double radians) {
+  if (radians == 0) return camera;
+  const Rotation turn = rotation_y(radians);
+  camera.position = center + turn * (camera.position - center);
+  camera.orientation = turn * camera.orientation;
+  return camera;
+}
+
 }  // namespace haarlight

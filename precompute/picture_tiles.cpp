@@ -10,7 +10,11 @@ class PictureWorker : public TileSource::Worker {
   PictureWorker(const TileTracer& tracer, int width) : tracer_(tracer), width_(width) {}
 
   void trace(std::span<const std::uint32_t> outputs, TileRows& rows) override {
-    tracer_.trace(outputs, scratch_, rows, counts, &noise);
+    TileNoise here;
+    tracer_.trace(outputs, scratch_, rows, counts, &here);
+    rows.noise_variance = here.variance;
+    rows.noise_energy = here.energy;
+    noise.add(here);
   }
 
   bool shows_scene(std::span<const std::uint32_t> outputs) override {

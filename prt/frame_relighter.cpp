@@ -56,7 +56,8 @@ void FrameRelighter::compare_with_reference(bool compare) {
   if (!compare || exact_) return;
   LightingOptions exact;
   exact.method = LightingMethod::reference;
-  exact_.emplace(Exact{LightingTracker(transport().layout(), exact), ImageRelighter(transport())});
+  exact_.emplace(
+      Exact{LightingTracker(transport().layout(), exact), PictureRelighter(transport())});
   exact_->relighter.expect_resets(false);
 }
 
@@ -112,6 +113,7 @@ const FrameMetrics& FrameRelighter::relight(std::span<const Rgb> target, FrameSt
   metrics_.image_rel_rmse.reset();
   metrics_.image_max_abs.reset();
   if (compare_ && exact_) {
+    exact_->relighter.set_camera(relighter_.camera());
     exact_->relighter.apply(exact_->tracker.advance(target));
     const ImageDifference difference =
         compare_images(relighter_.picture(), exact_->relighter.picture());

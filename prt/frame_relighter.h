@@ -9,8 +9,9 @@
 #include <string>
 
 #include "core/image.h"
-#include "prt/image_relighter.h"
 #include "prt/lighting_tracker.h"
+#include "prt/picture_relighter.h"
+#include "prt/scene_view.h"
 #include "prt/transport.h"
 #include "prt/wavelet_weight.h"
 
@@ -30,7 +31,7 @@ struct FrameMetrics {
   std::optional<double> image_rel_rmse, image_max_abs;
   double update_ms = 0;     ///< deciding the update
   double apply_ms = 0;      ///< streaming columns into sums
-  double finish_ms = 0;     ///< sums to pixels
+  double finish_ms = 0;     ///< sums to pixels, drawing of a mesh included
   double total_ms = 0;      ///< wall time from the target's coefficients to the picture
   std::uint64_t bytes = 0;  ///< of transport and of sums moved
 };
@@ -57,7 +58,12 @@ class FrameRelighter {
   /// number is the caller's. Throws as LightingTracker::advance, and then changes nothing.
   const FrameMetrics& relight(std::span<const Rgb> target, FrameStart start, int frame);
 
+  /// From where a mesh is drawn from the next frame on; see PictureRelighter::set_camera.
+  void set_camera(const Camera& camera) { relighter_.set_camera(camera); }
+
   const Image& picture() const { return relighter_.picture(); }
+  /// What the picture looks at; valid until the next frame.
+  SceneView view() const { return {relighter_.camera(), relighter_.coverage()}; }
   /// The same under the exact lighting; null unless asked for.
   const Image* reference() const;
   const LightingTracker& tracker() const { return tracker_; }
@@ -69,10 +75,10 @@ class FrameRelighter {
 
   LightingTracker tracker_;
   WaveletWeight weight_;
-  ImageRelighter relighter_;
+  PictureRelighter relighter_;
   struct Exact {
     LightingTracker tracker;
-    ImageRelighter relighter;
+    PictureRelighter relighter;
   };
   std::optional<Exact> exact_;
   bool compare_ = false;

@@ -2,23 +2,21 @@
 
 #pragma once
 
+#include <cstdint>
+#include <span>
+
 #include "core/image.h"
+#include "prt/relight_stats.h"
 #include "prt/row_sums.h"
+#include "prt/scene_view.h"
 #include "wavelet/environment.h"
 
 namespace haarlight {
 
-/// Time and traffic of one frame.
-struct RelightStats {
-  ApplyStats apply;
-  double apply_ms = 0;   ///< streaming columns into sums
-  double finish_ms = 0;  ///< sums to pixels, done chunk by chunk while they are in cache; both are
-                         ///< shares of the frame's wall time
-};
-
 /// picture() == T * shown after every apply(): the radiance of the scene, nothing where it is not.
 class ImageRelighter {
  public:
+  /// Throws Error{invalid_argument} for the transport of a mesh.
   explicit ImageRelighter(Transport transport);
 
   RelightStats apply(const LightingUpdate& update);
@@ -37,8 +35,9 @@ class ImageRelighter {
 /// coefficients. Agrees with ImageRelighter to rounding; a test says so.
 Image relight_once(const Transport& transport, std::span<const Rgb> lighting);
 
-/// Draws `environment`, turned by `rotation`, where the scene does not cover `picture`.
-void composite_environment(const Transport& transport, const Environment& environment,
+/// Draws `environment`, turned by `rotation`, where the scene does not cover `picture`. View and
+/// picture are of one size.
+void composite_environment(const SceneView& view, const Environment& environment,
                            const Rotation& rotation, Image& picture);
 
 }  // namespace haarlight

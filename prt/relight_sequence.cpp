@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstddef>
 
 #include "core/error.h"
@@ -15,13 +16,31 @@ namespace {
 void hand_out(const FrameRelighter& relighter, const FrameMetrics& metrics,
               std::span<const Rgb> target, int frames, const FrameDone& frame_done) {
   if (!frame_done) return;
-  if (!frame_done(SequenceFrame{metrics, relighter.picture(), relighter.reference(), target})) {
+  const SceneView view = relighter.view();
+  if (!frame_done(
+          SequenceFrame{metrics, relighter.picture(), relighter.reference(), target, view})) {
     throw Error(ErrorKind::cancelled,
                 fmt::format("relighting stopped after {} of {} frames", metrics.frame + 1, frames));
   }
 }
 
 }  // namespace
+
+Camera sequence_camera(const Transport& transport, const SequenceOptions& options, int frame) {
+  Camera camera = transport.info().camera;
+  if (transport.kind() == TransportKind::image) {
+    if (options.orbit_degrees != 0 || options.width != 0 || options.height != 0) {
+      throw Error(ErrorKind::invalid_argument,
+                  "an orbit or a size is for the transport of a mesh; this one is of one view");
+    }
+    return camera;
+  }
+  if (options.width > 0) camera.width = options.width;
+  if (options.height > 0) camera.height = options.height;
+  const double t = static_cast<double>(std::min(frame, options.motion.stop)) / options.motion.stop;
+  return turned_about(camera, bounding_sphere(*transport.info().mesh).center,
+                      options.orbit_degrees * t * kPi / 180);
+}
 
 void relight_sequence(const Transport& transport, const Environment& from, const Environment* to,
                       const SequenceOptions& options, const FrameDone& frame_done) {
@@ -36,6 +55,7 @@ void relight_sequence(const Transport& transport, const Environment& from, const
     const std::span<const Rgb> target = motion.coefficients(frame);
     const FrameStart start =
         frame == 0 && !options.from_dark ? FrameStart::exact : FrameStart::advance;
+    relighter.set_camera(sequence_camera(transport, options, frame));
     hand_out(relighter, relighter.relight(target, start, frame), target, options.frames,
              frame_done);
   }

@@ -5,112 +5,108 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
-#include <xxhash.h>
 
 #include <algorithm>
 #include <cerrno>
-#include <cstddef>
 #include <cstring>
+#include <utility>
 
 #include "core/error.h"
 
 namespace haarlight {
 namespace {
 
-constexpr char kJournalMagic[8] = {'H', 'l', 't', 'j', 'r', 'n', '0', '1'};
-
-struct JournalHeader {
-  char magic[8];
-  std::uint64_t fingerprint;
-  std::uint64_t tiles;
-};
-
-struct RecordHeader {
-  std::uint32_t tile;
-  std::uint32_t rgb_blocks;
-  std::uint64_t present, scales, values, errors;  ///< counts of what follows
-  std::uint64_t hash;                             ///< of the payload
-};
-
 [[noreturn]] void refuse(const std::filesystem::path& file, const char* what) {
   throw Error(ErrorKind::io, fmt::format("{}: {}: {}", file.string(), what, std::strerror(errno)));
 }
 
-void write_all(int descriptor, const std::byte* bytes, std::size_t size, std::uint64_t offset,
+void write_all(int descriptor, std::span<const std::byte> bytes, std::uint64_t offset,
                const std::filesystem::path& file) {
-  while (size > 0) {
-    const ssize_t n = ::pwrite(descriptor, bytes, size, static_cast<off_t>(offset));
+  while (!bytes.empty()) {
+    const ssize_t n = ::pwrite(descriptor, bytes.data(), bytes.size(), static_cast<off_t>(offset));
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0) {
       if (n == 0) errno = ENOSPC;
       refuse(file, "cannot write");
     }
-    bytes += n;
-    size -= static_cast<std::size_t>(n);
+    bytes = bytes.subspan(static_cast<std::size_t>(n));
     offset += static_cast<std::uint64_t>(n);
   }
 }
 
 // False at the end of the file.
-bool read_all(int descriptor, std::byte* bytes, std::size_t size, std::uint64_t offset,
+bool read_all(int descriptor, std::span<std::byte> bytes, std::uint64_t offset,
               const std::filesystem::path& file) {
-  while (size > 0) {
-    const ssize_t n = ::pread(descriptor, bytes, size, static_cast<off_t>(offset));
+  while (!bytes.empty()) {
+    const ssize_t n = ::pread(descriptor, bytes.data(), bytes.size(), static_cast<off_t>(offset));
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) refuse(file, "cannot read");
     if (n == 0) return false;
-    bytes += n;
-    size -= static_cast<std::size_t>(n);
+    bytes = bytes.subspan(static_cast<std::size_t>(n));
     offset += static_cast<std::uint64_t>(n);
   }
   return true;
 }
 
-constexpr std::uint64_t kRowBytes = kTileRows * (sizeof(Rgb) + sizeof(float));
-
-std::uint64_t payload_size(const RecordHeader& h) {
-  return h.present + 2 * h.scales + h.values + 16 * h.errors + kRowBytes;
+std::uint64_t size_of(int descriptor, const std::filesystem::path& file) {
+  const off_t end = ::lseek(descriptor, 0, SEEK_END);
+  if (end < 0) refuse(file, "cannot read");
+  return static_cast<std::uint64_t>(end);
 }
 
-template <typename T>
-void append_bytes(std::vector<std::byte>& to, const std::vector<T>& values) {
-  const std::size_t begin = to.size(), size = values.size() * sizeof(T);
-  to.resize(begin + size);
-  if (size > 0) std::memcpy(to.data() + begin, values.data(), size);
-}
-
-template <typename T>
-const std::byte* take(const std::byte* from, std::vector<T>& values, std::uint64_t count) {
-  values.resize(count);
-  if (count > 0) std::memcpy(static_cast<void*>(values.data()), from, count * sizeof(T));
-  return from + count * sizeof(T);
+// The bytes of the head at the beginning of a file; empty if there is no room for what it claims.
+std::vector<std::byte> read_head(int descriptor, std::uint64_t file_size,
+                                 const std::filesystem::path& file) {
+  std::vector<std::byte> bytes(kHeadFixedBytes);
+  if (file_size < bytes.size() || !read_all(descriptor, bytes, 0, file)) return {};
+  const std::uint64_t size = packed_head_size(bytes);
+  if (size == 0 || size > file_size) return {};
+  bytes.resize(size);
+  return read_all(descriptor, bytes, 0, file) ? bytes : std::vector<std::byte>();
 }
 
 }  // namespace
 
-TileJournal::TileJournal(const std::filesystem::path& file, const std::string& fingerprint,
-                         int tiles, bool resume)
-    : file_(file), places_(static_cast<std::size_t>(tiles)) {
+TileJournal::TileJournal(const std::filesystem::path& file, const JournalHead& head, bool resume)
+    : file_(file), head_(head), places_(static_cast<std::size_t>(head.tiles)) {
+  const std::optional<JournalHead> found = resume ? peek(file) : std::nullopt;
   descriptor_ = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (descriptor_ < 0) refuse(file, "cannot be created");
-  JournalHeader header{};
-  std::memcpy(header.magic, kJournalMagic, sizeof kJournalMagic);
-  header.fingerprint = XXH3_64bits(fingerprint.data(), fingerprint.size());
-  header.tiles = static_cast<std::uint64_t>(tiles);
-
   try {
-    JournalHeader found{};
-    const bool ours =
-        resume &&
-        read_all(descriptor_, reinterpret_cast<std::byte*>(&found), sizeof found, 0, file_) &&
-        std::memcmp(&found, &header, sizeof header) == 0;
-    if (ours) {
-      scan();
+    if (found && same_run(*found, head) && found->shard == head.shard) {
+      const std::uint64_t file_size = size_of(descriptor_, file_);
+      scan(read_head(descriptor_, file_size, file_).size(), file_size);
+      if (::ftruncate(descriptor_, static_cast<off_t>(end_)) != 0) refuse(file_, "cannot be cut");
     } else {
       if (::ftruncate(descriptor_, 0) != 0) refuse(file_, "cannot be emptied");
-      write_all(descriptor_, reinterpret_cast<const std::byte*>(&header), sizeof header, 0, file_);
-      end_ = sizeof header;
+      const std::vector<std::byte> bytes = pack_head(head);
+      write_all(descriptor_, bytes, 0, file_);
+      end_ = bytes.size();
     }
+  } catch (...) {
+    ::close(descriptor_);
+    throw;
+  }
+}
+
+TileJournal::TileJournal(const std::filesystem::path& file) : file_(file) {
+  descriptor_ = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor_ < 0 && errno == ENOENT) {
+    throw Error(ErrorKind::missing, fmt::format("{}: no such file, expected a shard made with "
+                                                "haarlight precompute --shard",
+                                                file.string()));
+  }
+  if (descriptor_ < 0) refuse(file, "cannot be opened");
+  try {
+    const std::uint64_t file_size = size_of(descriptor_, file_);
+    const std::vector<std::byte> bytes = read_head(descriptor_, file_size, file_);
+    head_ = unpack_head(bytes, file.string());
+    if (head_.tiles < 0 || head_.tiles > (1 << 25)) {
+      throw Error(ErrorKind::format,
+                  fmt::format("{}: {} tiles, expected at most 2^25", file.string(), head_.tiles));
+    }
+    places_.resize(static_cast<std::size_t>(head_.tiles));
+    scan(bytes.size(), file_size);
   } catch (...) {
     ::close(descriptor_);
     throw;
@@ -121,37 +117,41 @@ TileJournal::~TileJournal() {
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-// Finds whole records; the first that is torn or damaged ends the journal.
-void TileJournal::scan() {
-  end_ = sizeof(JournalHeader);
-  const off_t file_end = ::lseek(descriptor_, 0, SEEK_END);
-  if (file_end < 0) refuse(file_, "cannot read");
-  const auto file_size = static_cast<std::uint64_t>(file_end);
-  std::vector<std::byte> payload;
-  for (;;) {
-    RecordHeader header;
-    if (!read_all(descriptor_, reinterpret_cast<std::byte*>(&header), sizeof header, end_, file_)) {
-      break;
-    }
-    const std::uint64_t left = file_size - std::min(file_size, end_ + sizeof header);
-    if (header.tile >= places_.size() || header.present > left || header.scales > left ||
-        header.values > left || header.errors > left || payload_size(header) > left) {
-      break;
-    }
-    payload.resize(payload_size(header));
-    if (!read_all(descriptor_, payload.data(), payload.size(), end_ + sizeof header, file_) ||
-        XXH3_64bits(payload.data(), payload.size()) != header.hash) {
-      break;
-    }
-    places_[header.tile] = {end_, sizeof header + payload.size()};
-    end_ += sizeof header + payload.size();
+std::optional<JournalHead> TileJournal::peek(const std::filesystem::path& file) {
+  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) return std::nullopt;
+  std::optional<JournalHead> head;
+  try {
+    head = unpack_head(read_head(descriptor, size_of(descriptor, file), file), file.string());
+  } catch (const Error&) {
+    head.reset();  // not one of ours, or damaged: as if it were not there
   }
-  if (::ftruncate(descriptor_, static_cast<off_t>(end_)) != 0) refuse(file_, "cannot be cut");
+  ::close(descriptor);
+  return head;
 }
 
-bool TileJournal::has(int tile) const {
+// Finds whole records; the first that is torn or damaged ends the journal.
+void TileJournal::scan(std::uint64_t begin, std::uint64_t file_size) {
+  end_ = begin;
+  std::vector<std::byte> bytes;
+  while (end_ + kRecordHeaderBytes <= file_size) {
+    bytes.resize(kRecordHeaderBytes);
+    if (!read_all(descriptor_, bytes, end_, file_)) break;
+    const std::optional<std::uint64_t> size =
+        packed_record_size(bytes, head_.tiles, file_size - end_ - kRecordHeaderBytes);
+    if (!size) break;
+    bytes.resize(*size);
+    if (!read_all(descriptor_, bytes, end_, file_) || !packed_record_is_whole(bytes)) break;
+    places_[static_cast<std::size_t>(packed_record_tile(bytes))] = {end_, *size};
+    end_ += *size;
+  }
+}
+
+bool TileJournal::has(int tile) const { return record_bytes(tile) > 0; }
+
+std::uint64_t TileJournal::record_bytes(int tile) const {
   const std::lock_guard lock(mutex_);
-  return places_[static_cast<std::size_t>(tile)].size > 0;
+  return places_[static_cast<std::size_t>(tile)].size;
 }
 
 int TileJournal::count() const {
@@ -160,30 +160,20 @@ int TileJournal::count() const {
       std::count_if(places_.begin(), places_.end(), [](const Place& p) { return p.size > 0; }));
 }
 
-void TileJournal::append(int tile, const TileRecord& record) {
-  RecordHeader header{};
-  header.tile = static_cast<std::uint32_t>(tile);
-  header.rgb_blocks = record.tile.rgb_blocks;
-  header.present = record.tile.present.size();
-  header.scales = record.tile.scales.size();
-  header.values = record.tile.values.size();
-  header.errors = record.error.error.size();
-  std::vector<std::byte> bytes(sizeof header);
-  bytes.reserve(sizeof header + payload_size(header));
-  append_bytes(bytes, record.tile.present);
-  append_bytes(bytes, record.tile.scales);
-  append_bytes(bytes, record.tile.values);
-  append_bytes(bytes, record.error.error);
-  append_bytes(bytes, record.error.energy);
-  append_bytes(bytes, record.color);
-  append_bytes(bytes, record.coverage);
-  header.hash = XXH3_64bits(bytes.data() + sizeof header, bytes.size() - sizeof header);
-  std::memcpy(bytes.data(), &header, sizeof header);
-
+void TileJournal::append(std::span<const std::byte> record) {
+  const std::uint64_t left =
+      record.size() < kRecordHeaderBytes ? 0 : record.size() - kRecordHeaderBytes;
+  if (packed_record_size(record, head_.tiles, left) != record.size() ||
+      !packed_record_is_whole(record)) {
+    throw Error(ErrorKind::format,
+                fmt::format("{}: was handed {} bytes that are no tile, expected a whole one",
+                            file_.string(), record.size()));
+  }
+  const int tile = packed_record_tile(record);
   const std::lock_guard lock(mutex_);
-  write_all(descriptor_, bytes.data(), bytes.size(), end_, file_);
-  places_[static_cast<std::size_t>(tile)] = {end_, bytes.size()};
-  end_ += bytes.size();
+  write_all(descriptor_, record, end_, file_);
+  places_[static_cast<std::size_t>(tile)] = {end_, record.size()};
+  end_ += record.size();
 }
 
 std::optional<TileRecord> TileJournal::read(int tile) const {
@@ -194,24 +184,12 @@ std::optional<TileRecord> TileJournal::read(int tile) const {
   }
   if (place.size == 0) return std::nullopt;
   std::vector<std::byte> bytes(place.size);
-  RecordHeader header;
-  const bool whole = read_all(descriptor_, bytes.data(), bytes.size(), place.offset, file_);
-  if (whole) std::memcpy(&header, bytes.data(), sizeof header);
-  if (!whole || sizeof header + payload_size(header) != bytes.size() ||
-      XXH3_64bits(bytes.data() + sizeof header, bytes.size() - sizeof header) != header.hash) {
+  std::optional<TileRecord> record;
+  if (read_all(descriptor_, bytes, place.offset, file_)) record = unpack_record(bytes);
+  if (!record) {
     throw Error(ErrorKind::format,
                 fmt::format("{}: tile {} does not read as it was written", file_.string(), tile));
   }
-  TileRecord record;
-  record.tile.rgb_blocks = header.rgb_blocks;
-  const std::byte* from = bytes.data() + sizeof header;
-  from = take(from, record.tile.present, header.present);
-  from = take(from, record.tile.scales, header.scales);
-  from = take(from, record.tile.values, header.values);
-  from = take(from, record.error.error, header.errors);
-  from = take(from, record.error.energy, header.errors);
-  from = take(from, record.color, kTileRows);
-  take(from, record.coverage, kTileRows);
   return record;
 }
 

@@ -33,14 +33,10 @@ int level_of(double rms) {
 double threshold_of(int level) { return kSmallestThreshold * std::exp2(level / kStepsAnOctave); }
 
 // What a squared error of a row weighs in the picture.
-double row_weight(const TileRows& tile, std::size_t row) {
-  if (tile.rgb_blocks >> (row / kBlock) & 1) return 1;
-  const RgbD c(tile.color[row]);
+double row_weight(unsigned rgb_blocks, const Rgb& color, std::size_t row) {
+  if (rgb_blocks >> (row / kBlock) & 1) return 1;
+  const RgbD c(color);
   return c.r * c.r + c.g * c.g + c.b * c.b;
-}
-
-std::size_t row_channels(const TileRows& tile, std::size_t row) {
-  return tile.rgb_blocks >> (row / kBlock) & 1 ? 3 : 1;
 }
 
 // Products and sums in double; eight lanes, so that the compiler may vectorise without reordering.
@@ -75,25 +71,43 @@ double PictureError::worst() const {
   return worst;
 }
 
-PictureError tile_error(const HaarLayout& layout, const TileRows& exact,
-                        const CompressedTile& compressed,
-                        std::span<const std::vector<float>> lightings) {
+std::vector<double> tile_pictures(const HaarLayout& layout, std::span<const float> values,
+                                  unsigned rgb_blocks,
+                                  std::span<const std::vector<float>> lightings) {
   const auto size = static_cast<std::size_t>(layout.size());
+  const std::size_t channels = rgb_blocks == 0 ? 1 : 3;
+  std::vector<double> pictures(lightings.size() * channels * kRows);
+  for (std::size_t ch = 0; ch < channels; ++ch) {
+    for (std::size_t row = 0; row < kRows; ++row) {
+      if (ch > 0 && !(rgb_blocks >> (row / kBlock) & 1)) continue;
+      const float* entries = values.data() + (ch * kRows + row) * size;
+      for (std::size_t l = 0; l < lightings.size(); ++l) {
+        pictures[(l * channels + ch) * kRows + row] =
+            dot_product(entries, lightings[l].data(), size);
+      }
+    }
+  }
+  return pictures;
+}
+
+PictureError tile_error(const HaarLayout& layout, std::span<const double> exact,
+                        const CompressedTile& compressed, std::span<const Rgb> color,
+                        std::span<const std::vector<float>> lightings) {
+  std::vector<float> values;
+  decompress_tile(layout, compressed, values);
+  const std::vector<double> kept = tile_pictures(layout, values, compressed.rgb_blocks, lightings);
+  const std::size_t channels = compressed.rgb_blocks == 0 ? 1 : 3;
   PictureError sum;
   sum.error.resize(lightings.size());
   sum.energy.resize(lightings.size());
-  std::vector<float> kept;
-  decompress_tile(layout, compressed, kept);
   for (std::size_t row = 0; row < kRows; ++row) {
-    const double weight = row_weight(exact, row);
-    for (std::size_t ch = 0; ch < row_channels(exact, row); ++ch) {
-      const float* e = exact.values.data() + (ch * kRows + row) * size;
-      const float* k = kept.data() + (ch * kRows + row) * size;
+    const double weight = row_weight(compressed.rgb_blocks, color[row], row);
+    for (std::size_t ch = 0; ch < channels; ++ch) {  // channels not in use are zero in both
       for (std::size_t l = 0; l < lightings.size(); ++l) {
-        const double picture = dot_product(e, lightings[l].data(), size);
-        const double difference = picture - dot_product(k, lightings[l].data(), size);
+        const std::size_t at = (l * channels + ch) * kRows + row;
+        const double difference = exact[at] - kept[at];
         sum.error[l] += weight * difference * difference;
-        sum.energy[l] += weight * picture * picture;
+        sum.energy[l] += weight * exact[at] * exact[at];
       }
     }
   }
@@ -111,6 +125,9 @@ struct ToleranceTuner::State {
   // Squared picture error if all blocks below each level were dropped.
   std::vector<std::array<double, kLevels>> errors;
   std::vector<double> energies;
+  // Scales that are stored at each level, and columns' heads shared out over the tiles of a chunk.
+  std::array<double, kLevels> scales{};
+  int tiles = 0;
 };
 
 ToleranceTuner::ToleranceTuner(const HaarLayout& layout, double error) {
@@ -127,6 +144,7 @@ void ToleranceTuner::add(const TileRows& tile) {
   State& s = *state_;
   const auto size = static_cast<std::size_t>(s.layout.size());
   std::vector<std::uint8_t> level(size);
+  ++s.tiles;
   for (std::size_t block = 0; block < kTileBlocks; ++block) {
     const std::size_t channels = tile.rgb_blocks >> block & 1 ? 3 : 1;
     for (std::size_t j = 0; j < size; ++j) {
@@ -139,10 +157,11 @@ void ToleranceTuner::add(const TileRows& tile) {
       }
       level[j] = static_cast<std::uint8_t>(
           level_of(std::sqrt(energy / static_cast<double>(kBlock * channels))));
+      if (energy > 0) s.scales[level[j]] += static_cast<double>(channels);
     }
     for (std::size_t r = 0; r < kBlock; ++r) {
       const std::size_t row = block * kBlock + r;
-      const double weight = row_weight(tile, row);
+      const double weight = row_weight(tile.rgb_blocks, tile.color[row], row);
       for (std::size_t ch = 0; ch < channels; ++ch) {
         const float* values = tile.values.data() + (ch * kRows + row) * size;
         for (std::size_t l = 0; l < s.lightings.size(); ++l) {
@@ -186,6 +205,32 @@ std::vector<float> ToleranceTuner::thresholds() const {
   const double threshold = level > 0 && anything && s.error > 0 ? threshold_of(level - 1) : 0.0;
   return std::vector<float>(static_cast<std::size_t>(s.layout.band_count()),
                             static_cast<float>(threshold));
+}
+
+double ToleranceTuner::tile_bytes(float threshold) const {
+  const State& s = *state_;
+  if (s.tiles == 0) return 0;
+  double scales = 0;
+  for (int i = 0; i < kLevels; ++i) {
+    if (threshold_of(i) > static_cast<double>(threshold)) {
+      scales += s.scales[static_cast<std::size_t>(i)];
+    }
+  }
+  scales /= s.tiles;
+  // 18 bytes a scale with its values; 32 and some padding a column, which the tiles of a chunk
+  // share.
+  const double columns = std::min(scales, static_cast<double>(s.layout.size()) * 40 / 64);
+  return 18 * scales + columns;
+}
+
+std::vector<float> ToleranceTuner::thresholds_for_size(double tile_bytes_wanted) const {
+  std::vector<float> found = thresholds();
+  float threshold = found.front();
+  for (int i = 0; i < kLevels && tile_bytes(threshold) > tile_bytes_wanted; ++i) {
+    threshold = std::max(threshold, static_cast<float>(threshold_of(i)));
+  }
+  std::fill(found.begin(), found.end(), threshold);
+  return found;
 }
 
 }  // namespace haarlight

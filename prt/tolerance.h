@@ -20,9 +20,17 @@ struct PictureError {
   double worst() const;
 };
 
-/// What compressing did to one tile under the given lightings.
-PictureError tile_error(const HaarLayout& layout, const TileRows& exact,
-                        const CompressedTile& compressed,
+/// The picture of a tile's rows under each lighting, without colours: [lighting][channel][row], one
+/// channel where rgb_blocks is 0, else three, of which grey blocks use the first. `values` as in
+/// TileRows.
+std::vector<double> tile_pictures(const HaarLayout& layout, std::span<const float> values,
+                                  unsigned rgb_blocks,
+                                  std::span<const std::vector<float>> lightings);
+
+/// What compressing did to one tile: `exact` is tile_pictures of its exact rows, `color` its rows'
+/// colours.
+PictureError tile_error(const HaarLayout& layout, std::span<const double> exact,
+                        const CompressedTile& compressed, std::span<const Rgb> color,
                         std::span<const std::vector<float>> lightings);
 
 }  // namespace haarlight

@@ -2,9 +2,12 @@
 
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -36,6 +39,9 @@ struct TileRows {
                                 ///< rgb_blocks == 0, else 3, grey blocks using channel 0 only
   std::vector<Rgb> color;       ///< kTileRows: albedo of grey rows; {1,1,1} for rows of RGB blocks
   std::vector<float> coverage;  ///< kTileRows: share of the pixel covered by the scene; 1: vertex
+  /// How far chance may have moved the tile's picture, per built-in lighting: expected squared
+  /// error and squared picture, summed over rows and channels. Empty: nothing was left to chance.
+  std::vector<double> noise_variance{}, noise_energy{};
 };
 
 /// Finds how small an entry may be dropped, from a few pilot tiles, so that the relative error of
@@ -48,20 +54,68 @@ class ToleranceTuner {
   ~ToleranceTuner();
   void add(const TileRows& tile);         ///< not thread-safe
   std::vector<float> thresholds() const;  ///< per band; all 0 when error == 0 or no light falls
+  /// The same, but high enough for the mean of the tiles to have at most `tile_bytes` bytes in a
+  /// file, as far as can be told before.
+  std::vector<float> thresholds_for_size(double tile_bytes) const;
+  /// Bytes of the mean tile in a file at a threshold, about.
+  double tile_bytes(float threshold) const;
+
  private:
   struct State;
   std::unique_ptr<State> state_;
+};
+
+/// A slice of a run: tiles t with t % count == index - 1.
+struct Shard {
+  int index = 1, count = 1;
+  bool has(int tile) const { return tile % count == index - 1; }
+  bool operator==(const Shard&) const = default;
 };
 
 struct TransportWriterOptions {
   std::vector<float> thresholds;  ///< per band: blocks whose RMS entry is below are dropped
   std::string fingerprint;        ///< what the rows are made from (scene, camera, options): a
                                   ///< journal of another fingerprint is not continued
-  bool resume = false;            ///< continue FILE.partial if it is there and fits
+  bool resume = false;            ///< continue the journal if it is there and fits
+  std::string meta{};             ///< as for finish(); what a shard carries until it is joined
+  Shard shard{};                  ///< of which the journal is; all tiles may still be written
+  std::uint64_t max_bytes = 0;    ///< that the file may have; 0: no limit. Further blocks are
+                                  ///< dropped, the weakest first, as far as it takes
+};
+
+/// Where tiles go until the file is put together: FILE.partial, or FILE.shard-1-of-3.
+std::filesystem::path journal_path(const std::filesystem::path& file, const Shard& shard);
+
+/// The thresholds of a journal that --resume would go on with, so that they need not be found
+/// again; nothing if there is none of this fingerprint.
+std::optional<std::vector<float>> journal_thresholds(const std::filesystem::path& file,
+                                                     const std::string& fingerprint,
+                                                     const Shard& shard);
+
+/// Throws Error{invalid_argument} naming the size needed if tables and indices alone are larger.
+void check_max_bytes(const TransportInfo& info, std::uint64_t max_bytes);
+
+struct TileRecord;  // prt/tile_record.h
+
+struct FinishOptions {
+  Progress progress{};
+  int workers = 0;  ///< chunks put together at a time, each in some hundred MB; 0: all threads
+  /// What to show for tiles that were never written: a preview. Called from several threads; may
+  /// return null. With it the journal stays unless all tiles were there.
+  std::function<std::shared_ptr<const TileRecord>(int tile)> stand_in{};
+};
+
+/// What a finished file is.
+struct TransportSummary {
+  std::uint64_t bytes = 0;
+  double measured_error = 0;  ///< largest relative picture error over the built-in lightings
+  double noise = 0;           ///< relative noise of the picture, estimated; 0: none
+  float size_threshold = 0;   ///< blocks below it were dropped for the sake of max_bytes; 0: none
+  bool complete = false;      ///< all tiles were written
 };
 
 /// Writes one transport file. Tiles may come in any order and from several threads; the file is
-/// the same bytes whatever the order. Compressed tiles are appended to a journal, FILE.partial, as
+/// the same bytes whatever the order. Compressed tiles are appended to a journal (journal_path) as
 /// they come, so that a run that was cut off goes on where it was; finish() sorts them into chunks.
 /// Throws Error{io} naming the file on any refusal of the system.
 class TransportWriter {
@@ -75,15 +129,28 @@ class TransportWriter {
   /// The outputs of a tile's rows: kTileRows entries of row_order.
   std::span<const std::uint32_t> tile_outputs(int tile) const;
   bool has_tile(int tile) const;                    ///< already in the journal
+  std::uint64_t record_bytes(int tile) const;       ///< that it has there; 0: it is not
   void write_tile(int tile, const TileRows& rows);  ///< thread-safe; compresses outside the lock
+  /// The same for a tile that was compressed elsewhere: see pack_record in prt/tile_record.h.
+  void write_record(std::span<const std::byte> packed);
+  void keep();  ///< leaves the journal, even without tiles: the thresholds in it are worth keeping
 
   /// Assembles, checksums and renames. Tiles never written are empty. `meta` is the JSON object
   /// kept with the file; keys "measured_error" (largest relative picture error over the built-in
-  /// lightings, from every 8th tile, compressed against exact), "thresholds", "bytes" are added.
-  void finish(const std::string& meta, const Progress& progress = {});
+  /// lightings, from every 8th tile, compressed against exact), "thresholds", "bytes", "complete"
+  /// are added, and where they say something "tiles", "tiles_traced", "noise", "max_bytes". Throws
+  /// Error{cancelled} if `progress` says so.
+  TransportSummary finish(const std::string& meta, const FinishOptions& options = {});
 
   /// Removes the journal; for a caller that gave up for good.
   void discard();
+
+  /// A file of nothing but stand-ins, for a run that ended before its first tile: no journal is
+  /// made or touched. Takes what the constructor and finish() take; the thresholds are the
+  /// caller's guess.
+  static TransportSummary write_stand_ins(const std::filesystem::path& file, TransportInfo info,
+                                          const TransportWriterOptions& options,
+                                          const FinishOptions& finishing);
 
  private:
   struct State;

@@ -352,7 +352,7 @@ TEST(TransportWriter, AFailedWriteKeepsTheOldFile) {
   {
     TransportWriter writer(folder / "a.hlt", small.info, {small.thresholds, "test", false});
     writer.write_tile(0, small.tiles[0]);
-    EXPECT_THROW(writer.finish("{}", [](double) { return false; }), Error);
+    EXPECT_THROW(writer.finish("{}", {.progress = [](double) { return false; }}), Error);
   }
   EXPECT_EQ(bytes_of(folder / "a.hlt"), before);
   EXPECT_THROW(TransportWriter(folder / "no-such-folder/a.hlt", small.info,

@@ -1,0 +1,151 @@
+// What a journal of tiles says of itself at its beginning.
+
+#include "prt/journal_head.h"
+
+#include <fmt/format.h>
+#include <xxhash.h>
+
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "prt/transport_format.h"
+
+namespace haarlight {
+namespace {
+
+constexpr char kJournalMagic[8] = {'H', 'l', 't', 'j', 'r', 'n', '0', '2'};
+
+struct FixedHead {
+  char magic[8];
+  std::uint64_t text, mesh;  ///< bytes of the two parts that follow
+  std::uint64_t hash;        ///< XXH3 of both
+};
+static_assert(sizeof(FixedHead) == kHeadFixedBytes);
+
+nlohmann::json camera_json(const Camera& camera) {
+  nlohmann::json rows = nlohmann::json::array();
+  for (const Vec3& r : camera.orientation.row) rows.push_back({r.x, r.y, r.z});
+  return {{"position", {camera.position.x, camera.position.y, camera.position.z}},
+          {"orientation", rows},
+          {"vertical_fov", camera.vertical_fov},
+          {"width", camera.width},
+          {"height", camera.height}};
+}
+
+Vec3 vec_of(const nlohmann::json& v) {
+  return {v.at(0).get<double>(), v.at(1).get<double>(), v.at(2).get<double>()};
+}
+
+Camera camera_of(const nlohmann::json& j) {
+  Camera camera;
+  camera.position = vec_of(j.at("position"));
+  for (std::size_t i = 0; i < 3; ++i) {
+    camera.orientation.row[i] = vec_of(j.at("orientation").at(i));
+  }
+  camera.vertical_fov = j.at("vertical_fov").get<double>();
+  camera.width = j.at("width").get<int>();
+  camera.height = j.at("height").get<int>();
+  return camera;
+}
+
+}  // namespace
+
+std::vector<std::byte> pack_head(const JournalHead& head) {
+  const TransportInfo& info = head.info;
+  nlohmann::json j{{"kind", static_cast<int>(info.kind)},
+                   {"face_size", info.face_size},
+                   {"width", info.width},
+                   {"height", info.height},
+                   {"terms", info.terms},
+                   {"camera", camera_json(info.camera)},
+                   {"fingerprint", head.fingerprint},
+                   {"thresholds", head.thresholds},
+                   {"meta", head.meta},
+                   {"max_bytes", head.max_bytes},
+                   {"shard", {head.shard.index, head.shard.count}},
+                   {"tiles", head.tiles}};
+  std::vector<std::byte> mesh;
+  if (info.mesh) {
+    mesh = pack_mesh(*info.mesh);
+    j["mesh"] = {{"vertices", info.mesh->position.size()},
+                 {"triangles", info.mesh->triangle.size()},
+                 {"materials", !info.mesh->material.empty()}};
+  }
+  const std::string text = j.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  FixedHead fixed{};
+  std::memcpy(fixed.magic, kJournalMagic, sizeof kJournalMagic);
+  fixed.text = text.size();
+  fixed.mesh = mesh.size();
+  std::vector<std::byte> bytes(sizeof fixed + text.size() + mesh.size());
+  std::byte* body = bytes.data() + sizeof fixed;
+  std::memcpy(body, text.data(), text.size());
+  if (!mesh.empty()) std::memcpy(body + text.size(), mesh.data(), mesh.size());
+  fixed.hash = XXH3_64bits(body, bytes.size() - sizeof fixed);
+  std::memcpy(bytes.data(), &fixed, sizeof fixed);
+  return bytes;
+}
+
+std::uint64_t packed_head_size(std::span<const std::byte> bytes) {
+  FixedHead fixed;
+  if (bytes.size() < sizeof fixed) return 0;
+  std::memcpy(&fixed, bytes.data(), sizeof fixed);
+  constexpr std::uint64_t kMost = std::uint64_t{1} << 40;
+  if (std::memcmp(fixed.magic, kJournalMagic, sizeof kJournalMagic) != 0 || fixed.text > kMost ||
+      fixed.mesh > kMost) {
+    return 0;
+  }
+  return sizeof fixed + fixed.text + fixed.mesh;
+}
+
+JournalHead unpack_head(std::span<const std::byte> bytes, const std::string& name) {
+  const auto refuse = [&](const std::string& why) -> Error {
+    return {ErrorKind::format,
+            fmt::format("{}: {}, expected a journal or shard of haarlight precompute", name, why)};
+  };
+  if (packed_head_size(bytes) != bytes.size()) throw refuse("does not begin like one");
+  FixedHead fixed;
+  std::memcpy(&fixed, bytes.data(), sizeof fixed);
+  const std::span<const std::byte> body = bytes.subspan(sizeof fixed);
+  if (XXH3_64bits(body.data(), body.size()) != fixed.hash) throw refuse("its head is damaged");
+  try {
+    const char* text = reinterpret_cast<const char*>(body.data());
+    const nlohmann::json j = nlohmann::json::parse(text, text + fixed.text);
+    JournalHead head;
+    TransportInfo& info = head.info;
+    info.kind = static_cast<TransportKind>(j.at("kind").get<int>());
+    info.face_size = j.at("face_size").get<int>();
+    info.width = j.at("width").get<int>();
+    info.height = j.at("height").get<int>();
+    info.terms = j.at("terms").get<int>();
+    info.camera = camera_of(j.at("camera"));
+    if (j.contains("mesh")) {
+      const nlohmann::json& m = j.at("mesh");
+      const MeshCounts counts{m.at("vertices").get<std::uint32_t>(),
+                              m.at("triangles").get<std::uint32_t>(),
+                              m.at("materials").get<bool>()};
+      info.mesh = std::make_shared<const TransportMesh>(
+          unpack_mesh(body.subspan(fixed.text), counts, name));
+    }
+    head.fingerprint = j.at("fingerprint").get<std::string>();
+    head.thresholds = j.at("thresholds").get<std::vector<float>>();
+    head.meta = j.at("meta").get<std::string>();
+    head.max_bytes = j.at("max_bytes").get<std::uint64_t>();
+    head.shard = {j.at("shard").at(0).get<int>(), j.at("shard").at(1).get<int>()};
+    head.tiles = j.at("tiles").get<int>();
+    return head;
+  } catch (const nlohmann::json::exception&) {
+    throw refuse("its head cannot be read");
+  }
+}
+
+bool same_run(const JournalHead& a, const JournalHead& b) {
+  const auto run_of = [](JournalHead head) {
+    head.meta.clear();
+    head.shard = {};
+    return pack_head(head);
+  };
+  return run_of(a) == run_of(b);
+}
+
+}  // namespace haarlight

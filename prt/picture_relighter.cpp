@@ -1,0 +1,117 @@
+// Relights either kind of transport and looks at it.
+
+#include "prt/picture_relighter.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstddef>
+#include <optional>
+#include <utility>
+
+#include "core/error.h"
+#include "prt/finish_rows.h"
+#include "prt/image_relighter.h"
+#include "prt/mesh_picture.h"
+#include "prt/mesh_relighter.h"
+
+namespace haarlight {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+bool same(const Camera& a, const Camera& b) {
+  return a.position == b.position && a.orientation.row == b.orientation.row &&
+         a.vertical_fov == b.vertical_fov && a.width == b.width && a.height == b.height;
+}
+
+}  // namespace
+
+struct PictureRelighter::State {
+  // One of the two, by the kind.
+  std::optional<ImageRelighter> image;
+  std::optional<MeshRelighter> vertices;
+  std::optional<MeshPicture> drawing;
+  Image picture;  // of the mesh
+  Camera camera;
+  bool looked = false, shaded = false;
+};
+
+PictureRelighter::PictureRelighter(const Transport& transport) : state_(std::make_unique<State>()) {
+  State& s = *state_;
+  s.camera = transport.info().camera;
+  if (transport.kind() == TransportKind::image) {
+    s.image.emplace(transport);
+    return;
+  }
+  if (transport.info().terms != 1) {
+    throw Error(ErrorKind::invalid_argument,
+                fmt::format("the transport has {} terms a vertex, expected 1: it is not for a "
+                            "view-independent picture",
+                            transport.info().terms));
+  }
+  s.vertices.emplace(transport);
+  s.drawing.emplace(transport.info().mesh);
+}
+
+PictureRelighter::~PictureRelighter() = default;
+PictureRelighter::PictureRelighter(PictureRelighter&&) noexcept = default;
+PictureRelighter& PictureRelighter::operator=(PictureRelighter&&) noexcept = default;
+
+void PictureRelighter::set_camera(const Camera& camera) {
+  State& s = *state_;
+  if (same(camera, s.camera)) return;
+  if (s.image) {
+    throw Error(ErrorKind::invalid_argument,
+                "the transport is of one view, expected its own camera");
+  }
+  s.camera = camera;
+  s.looked = s.shaded = false;
+}
+
+RelightStats PictureRelighter::apply(const LightingUpdate& update) {
+  State& s = *state_;
+  if (s.image) return s.image->apply(update);
+  RelightStats stats = s.vertices->apply(update);
+  const Clock::time_point begin = Clock::now();
+  if (!s.looked) s.drawing->look(s.camera);
+  s.looked = true;
+  if (!s.shaded || !update.empty()) s.drawing->shade(s.vertices->radiance(), s.picture);
+  s.shaded = true;
+  stats.finish_ms += std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+  return stats;
+}
+
+void PictureRelighter::expect_resets(bool expected) {
+  if (state_->image) {
+    state_->image->expect_resets(expected);
+  } else {
+    state_->vertices->expect_resets(expected);
+  }
+}
+
+const Camera& PictureRelighter::camera() const { return state_->camera; }
+
+const Image& PictureRelighter::picture() const {
+  return state_->image ? state_->image->picture() : state_->picture;
+}
+
+std::span<const float> PictureRelighter::coverage() const {
+  return state_->image ? state_->image->transport().coverage() : state_->drawing->coverage();
+}
+
+const Transport& PictureRelighter::transport() const {
+  return state_->image ? state_->image->transport() : state_->vertices->transport();
+}
+
+Image relight_picture_once(const Transport& transport, std::span<const Rgb> lighting,
+                           const Camera& camera) {
+  if (transport.kind() == TransportKind::image) return relight_once(transport, lighting);
+  PictureRelighter relighter(transport);
+  relighter.expect_resets(false);
+  relighter.set_camera(camera);
+  relighter.apply(full_update(transport.layout(), lighting));
+  return relighter.picture();
+}
+
+}  // namespace haarlight
