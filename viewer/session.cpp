@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/image_io.h"
 #include "core/parallel.h"
+#include "prt/image_relighter.h"
 #include "prt/motion_background.h"
 #include "prt/tonemap.h"
 #include "viewer/lighting_picture.h"
