@@ -32,6 +32,9 @@ void print_repairs(const std::filesystem::path& file, const SceneReport& report)
   print_count(file, report.unused_vertices, "unused vertices left out");
   print_count(file, report.normals_made, "vertex normals made");
   print_count(file, report.textures_missing, "textures not found, plain colours used");
+  print_count(file, report.blended_materials, "blended materials taken as holes or thin walls");
+  print_count(file, report.rough_glass, "materials of rough glass taken as smooth glass");
+  print_count(file, report.energy_scaled, "materials that reflect more than all light scaled down");
 }
 
 }  // namespace haarlight

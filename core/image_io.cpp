@@ -88,6 +88,25 @@ void check_shape(const fs::path& file, const OIIO::ImageSpec& spec) {
   }
 }
 
+std::unique_ptr<OIIO::ImageInput> open_input(const fs::path& file) {
+  check_readable(file);
+  // Colours must come as they are stored: a texture's alpha is no reason to darken them.
+  OIIO::ImageSpec hints;
+  hints.attribute("oiio:UnassociatedAlpha", 1);
+  auto input = OIIO::ImageInput::open(file.string(), &hints);
+  if (!input) {
+    fail(ErrorKind::format, file, "is no readable picture: " + one_line(OIIO::geterror()));
+  }
+  check_shape(file, input->spec());
+  return input;
+}
+
+// Some readers report success for scanlines that are not there, and only leave a message.
+void check_complete(const fs::path& file, const OIIO::ImageInput& input, bool success) {
+  if (success && !input.has_error()) return;
+  fail(ErrorKind::format, file, "is cut short or damaged: " + one_line(input.geterror()));
+}
+
 void write_float_picture(const fs::path& temporary, const fs::path& file, const Image& image,
                          bool with_compression) {
   OIIO::ImageSpec spec(image.width, image.height, 3, OIIO::TypeDesc::FLOAT);
@@ -122,18 +141,9 @@ void write_png(const fs::path& temporary, const fs::path& file, const Image& ima
 
 }  // namespace
 
-Image load_image(const fs::path& file) {
-  check_readable(file);
-  // Colours must come as they are stored: a texture's alpha is no reason to darken them.
-  OIIO::ImageSpec hints;
-  hints.attribute("oiio:UnassociatedAlpha", 1);
-  auto input = OIIO::ImageInput::open(file.string(), &hints);
-  if (!input) {
-    fail(ErrorKind::format, file, "is no readable picture: " + one_line(OIIO::geterror()));
-  }
+Image load_image(const fs::path& file, ImageEncoding encoding) {
+  const auto input = open_input(file);
   const OIIO::ImageSpec spec = input->spec();
-  check_shape(file, spec);
-
   Image image(spec.width, spec.height);
   bool complete = true;
   if (spec.nchannels >= 3) {
@@ -144,16 +154,28 @@ Image load_image(const fs::path& file) {
     std::transform(grey.begin(), grey.end(), image.pixels.begin(),
                    [](float value) { return Rgb(value, value, value); });
   }
-  // Some readers report success for scanlines that are not there, and only leave a message.
-  if (!complete || input->has_error()) {
-    fail(ErrorKind::format, file, "is cut short or damaged: " + one_line(input->geterror()));
-  }
-  if (!spec.format.is_floating_point()) {
+  check_complete(file, *input, complete);
+  if (encoding == ImageEncoding::color && !spec.format.is_floating_point()) {
     for (Rgb& pixel : image.pixels) {
       pixel = {linear_from_srgb(pixel.r), linear_from_srgb(pixel.g), linear_from_srgb(pixel.b)};
     }
   }
   return image;
+}
+
+std::vector<float> load_alpha(const fs::path& file) {
+  const auto input = open_input(file);
+  const OIIO::ImageSpec spec = input->spec();
+  // Files that name no alpha may have one all the same, behind grey or colour.
+  int channel = spec.alpha_channel;
+  if (channel < 0 && (spec.nchannels == 2 || spec.nchannels == 4)) channel = spec.nchannels - 1;
+  if (channel < 0) return {};
+  std::vector<float> alpha(static_cast<std::size_t>(spec.width) *
+                           static_cast<std::size_t>(spec.height));
+  const bool complete =
+      input->read_image(0, 0, channel, channel + 1, OIIO::TypeDesc::FLOAT, alpha.data());
+  check_complete(file, *input, complete);
+  return alpha;
 }
 
 void save_image(const fs::path& file, const Image& image) {

@@ -2,30 +2,26 @@
 
 #include "precompute/scene_import.h"
 
-#include <assimp/GltfMaterial.h>
 #include <assimp/material.h>
 #include <assimp/mesh.h>
 #include <assimp/scene.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <assimp/Importer.hpp>
 #include <cctype>
 #include <cmath>
-#include <cstdlib>
-#include <fstream>
 #include <limits>
-#include <map>
 #include <span>
 #include <string>
 
 #include "core/error.h"
-#include "core/image_io.h"
-#include "precompute/gltf_camera.h"
+#include "precompute/gltf_extras.h"
+#include "precompute/material_import.h"
 #include "precompute/ply_check.h"
 #include "precompute/polygon.h"
 #include "precompute/scene_clean.h"
+#include "precompute/texture_import.h"
 
 namespace haarlight {
 namespace {
@@ -62,136 +58,27 @@ float srgb_to_linear(float c) {
 
 // ---- materials ----------------------------------------------------------------------------------
 
-// A picture inside the scene file, decoded by way of a temporary file.
-Image load_embedded(const aiTexture& texture) {
-  if (texture.mHeight != 0) {  // plain 8-bit texels, sRGB
-    Image image(static_cast<int>(texture.mWidth), static_cast<int>(texture.mHeight));
-    for (std::size_t i = 0; i < image.pixels.size(); ++i) {
-      const aiTexel& t = texture.pcData[i];
-      const auto linear = [](unsigned char c) {
-        return srgb_to_linear(static_cast<float>(c) / 255.0f);
-      };
-      image.pixels[i] = {linear(t.r), linear(t.g), linear(t.b)};
+void add_materials(const aiScene& file, FileType type, const std::vector<GltfMaterial>& numbers,
+                   const std::filesystem::path& folder, Scene& scene) {
+  TextureImport textures(file, folder, scene);
+  for (unsigned m = 0; m < file.mNumMaterials; ++m) {
+    const aiMaterial& in = *file.mMaterials[m];
+    const std::string name = in.GetName().C_Str();
+    Material out;
+    const bool is_default = type == FileType::gltf ? m >= numbers.size()
+                            : type == FileType::ply
+                                ? name.empty()
+                                : name.empty() || name == AI_DEFAULT_MATERIAL_NAME;
+    if (is_default) {
+      if (!scene.tint.empty()) out.albedo = {1, 1, 1};  // the colour is in the vertices
+      out.name = "default";
+    } else {
+      out = type == FileType::gltf ? import_gltf_material(numbers[m], in, textures, scene.report)
+                                   : import_obj_material(in, textures, scene, scene.report);
+      out.name = name;
     }
-    return image;
+    scene.material.push_back(out);
   }
-  std::string suffix = ".";
-  suffix += texture.achFormatHint[0] != '\0' ? texture.achFormatHint : "png";
-  std::string name =
-      (std::filesystem::temp_directory_path() / ("haarlight-texture-XXXXXX" + suffix)).string();
-  const int descriptor = mkstemps(name.data(), static_cast<int>(suffix.size()));
-  if (descriptor < 0) {
-    throw Error(ErrorKind::io, fmt::format("{}: cannot be created to decode a texture", name));
-  }
-  close(descriptor);
-  struct Remove {
-    const std::string& name;
-    ~Remove() {
-      std::error_code ignored;
-      std::filesystem::remove(name, ignored);
-    }
-  } const remove{name};
-  std::ofstream out(name, std::ios::binary);
-  out.write(reinterpret_cast<const char*>(texture.pcData),
-            static_cast<std::streamsize>(texture.mWidth));
-  out.close();
-  if (!out) {
-    throw Error(ErrorKind::io, fmt::format("{}: cannot be written to decode a texture", name));
-  }
-  return load_image(name);
-}
-
-// The base colour textures of one file, each read once.
-class Textures {
- public:
-  Textures(const aiScene& file, const std::filesystem::path& folder, Scene& scene)
-      : file_(file), folder_(folder), scene_(scene) {}
-
-  // Index into scene.texture, or -1.
-  int index(const aiMaterial& material) {
-    aiString path;
-    if (material.GetTexture(aiTextureType_BASE_COLOR, 0, &path) != aiReturn_SUCCESS &&
-        material.GetTexture(aiTextureType_DIFFUSE, 0, &path) != aiReturn_SUCCESS) {
-      return -1;
-    }
-    const auto [at, is_new] = known_.try_emplace(path.C_Str(), -1);
-    if (!is_new) return at->second;
-    try {
-      const aiTexture* embedded = file_.GetEmbeddedTexture(path.C_Str());
-      Image image = embedded ? load_embedded(*embedded) : load_from_folder(path.C_Str());
-      for (Rgb& p : image.pixels) p = unit_rgb(p);
-      scene_.texture.push_back(std::move(image));
-      at->second = static_cast<int>(scene_.texture.size()) - 1;
-    } catch (const Error&) {
-      ++scene_.report.textures_missing;
-    }
-    return at->second;
-  }
-
- private:
-  Image load_from_folder(std::string name) const {
-    std::replace(name.begin(), name.end(), '\\', '/');  // as files from Windows have it
-    return load_image(folder_ / name);
-  }
-
-  const aiScene& file_;
-  std::filesystem::path folder_;
-  Scene& scene_;
-  std::map<std::string, int> known_;
-};
-
-Material obj_material(const aiMaterial& in) {
-  Material out;
-  aiColor3D color;
-  float value = 0;
-  if (in.Get(AI_MATKEY_COLOR_DIFFUSE, color) == aiReturn_SUCCESS) out.albedo = unit_rgb(color);
-  if (in.Get(AI_MATKEY_COLOR_SPECULAR, color) == aiReturn_SUCCESS) out.specular = unit_rgb(color);
-  if (in.Get(AI_MATKEY_SHININESS, value) == aiReturn_SUCCESS) {
-    out.exponent = value > 0 ? std::min(value, 1e4f) : 0.0f;
-  }
-  return out;
-}
-
-// See the header for the formulas.
-Material gltf_material(const aiMaterial& in) {
-  aiColor4D base(1, 1, 1, 1);
-  float metallic = 1, roughness = 1;
-  in.Get(AI_MATKEY_BASE_COLOR, base);
-  in.Get(AI_MATKEY_METALLIC_FACTOR, metallic);
-  in.Get(AI_MATKEY_ROUGHNESS_FACTOR, roughness);
-  const Rgb color = unit_rgb(base);
-  metallic = unit(metallic);
-  const double a = static_cast<double>(unit(roughness)) * static_cast<double>(unit(roughness));
-  const double exponent = std::min((2 / std::max(a * a, 1e-12) - 2) / 4, 1e4);
-
-  Material out;
-  out.albedo = color * (1 - metallic);
-  out.specular = Rgb{0.04f, 0.04f, 0.04f} * (1 - metallic) + color * metallic;
-  out.exponent = static_cast<float>(exponent);
-  constexpr double kNarrowEnough = 4;
-  if (exponent < kNarrowEnough) {
-    out.albedo = unit_rgb(out.albedo + out.specular);
-    out.specular = {0, 0, 0};
-  }
-  return out;
-}
-
-Material import_material(const aiMaterial& in, unsigned index, FileType type,
-                         std::size_t gltf_materials, bool tinted) {
-  const std::string name = in.GetName().C_Str();
-  Material out;
-  const bool is_default = type == FileType::gltf ? index >= gltf_materials
-                          : type == FileType::ply
-                              ? name.empty()
-                              : name.empty() || name == AI_DEFAULT_MATERIAL_NAME;
-  if (is_default) {
-    if (tinted) out.albedo = {1, 1, 1};  // the colour is in the vertices
-    out.name = "default";
-    return out;
-  }
-  out = type == FileType::gltf ? gltf_material(in) : obj_material(in);
-  out.name = name;
-  return out;
 }
 
 // ---- meshes -------------------------------------------------------------------------------------
@@ -298,6 +185,19 @@ void add_mesh(const aiMesh& mesh, const Transform& transform, FileType type, Sce
   }
 }
 
+// So that large scenes are not copied as they grow; nodes that share a mesh grow it still.
+void reserve_vertices(const aiScene& file, Scene& scene) {
+  std::size_t vertices = 0, faces = 0;
+  for (unsigned m = 0; m < file.mNumMeshes; ++m) {
+    vertices += file.mMeshes[m]->mNumVertices;
+    faces += file.mMeshes[m]->mNumFaces;
+  }
+  scene.position.reserve(vertices);
+  scene.normal.reserve(vertices);
+  scene.uv.reserve(vertices);
+  scene.triangle.reserve(faces);
+}
+
 void add_nodes(const aiScene& file, FileType type, Scene& scene) {
   struct Visit {
     const aiNode* node;
@@ -351,13 +251,10 @@ Scene import_scene(const std::filesystem::path& file) {
 
   Scene scene;
   scene.name = file.filename().string();
+  reserve_vertices(*read, scene);
   add_nodes(*read, type, scene);
-  Textures textures(*read, file.parent_path(), scene);
-  for (unsigned m = 0; m < read->mNumMaterials; ++m) {
-    scene.material.push_back(
-        import_material(*read->mMaterials[m], m, type, extras.materials, !scene.tint.empty()));
-    scene.material.back().texture = textures.index(*read->mMaterials[m]);
-  }
+  add_materials(*read, type, extras.material, file.parent_path(), scene);
+  importer.FreeScene();  // cleaning a large scene wants the room
   scene.camera = extras.camera;
   clean_scene(scene);
   return scene;

@@ -11,15 +11,18 @@ namespace haarlight {
 /// Reads a scene, all meshes placed by their nodes' transforms, cleaned as by clean_scene() with
 /// the counts in scene.report. Faces of more than three corners are cut into triangles.
 ///
-/// Materials, as Lambert plus one Phong lobe (precompute/scene.h), everything clamped to [0, 1]:
-/// - OBJ: albedo Kd, texture map_Kd, specular Ks, exponent Ns; all taken as linear.
-/// - glTF metallic-roughness: base colour b (linear factor times texture), metallic m, roughness r,
-///   reflectance at normal incidence F0 = 0.04 (1 - m) + m b. With a = r^2, GGX is close to
-///   Blinn-Phong of exponent 2 / a^2 - 2, and a Blinn-Phong lobe is about four times as wide in
-///   terms of the mirror direction: Phong e = (2 / a^2 - 2) / 4, at most 10,000. Then albedo =
-///   (1 - m) b, specular = F0. Lobes with e < 4 (r above 0.58) are too wide to tell from Lambert
-///   at the price of a lobe: their F0 goes into the albedo. On textured metals the texture colours
-///   both parts' albedo only; metallic-roughness textures, alpha and transmission are left out.
+/// Materials; every factor is clamped to its bounds, NaN becomes the default:
+/// - glTF: metallic_roughness with base colour, metallic-roughness and normal textures (texture
+///   coordinates 0, without KHR_texture_transform), KHR_materials_ior and _transmission. With a
+///   _volume of some thickness and transmission from one half it is glass; roughness of what passes
+///   is left out and counted. Alpha masks are holes; blended alpha from a texture makes holes below
+///   one half, an even one a thin wall that lets 1 - alpha through; both are counted.
+/// - OBJ: phong with albedo Kd, texture map_Kd, specular Ks, exponent Ns, all taken as linear, and
+///   scaled down together, with a count, where they reflect more than all; metallic_roughness
+///   where there is Pm or Pr. illum 3 and 5: mirror of Ks, or of Kd where Ks is black. illum 4, 6,
+///   7 and 9: glass with Ni (1.5 if missing or 1), tinted by Tf at each surface unless black. Other
+///   surfaces are holes where d, times map_d, is below one half, with a count. `norm` is a normal
+///   texture.
 /// - Vertex colours tint the albedo; 8-bit PLY colours are sRGB, glTF ones are linear.
 /// - No material in the file: grey, albedo 0.5.
 /// A texture that cannot be read is counted in the report and left out.

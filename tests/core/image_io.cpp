@@ -7,6 +7,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <fstream>
 #include <limits>
 #include <random>
 #include <thread>
@@ -61,6 +62,33 @@ TEST(ImageIo, ExrKeepsEveryFloat) {
     if (i == 2) continue;
     EXPECT_EQ(back.pixels[i], image.pixels[i]) << i;
   }
+}
+
+TEST(ImageIo, DataIsNotDecodedAndAlphaIsKept) {
+  const TemporaryFolder folder;
+  Image image(2, 1);
+  image.pixels = {{1, 0.25f, 0}, {0.5f, 0.5f, 0.5f}};
+  save_image(folder / "a.png", image);
+  // 0.25 is 137 and 0.5 is 188 of 255 in sRGB.
+  const Image data = load_image(folder / "a.png", ImageEncoding::data);
+  EXPECT_NEAR(data.pixels[0].g, 137 / 255.0f, 1e-6f);
+  EXPECT_NEAR(data.pixels[1].r, 188 / 255.0f, 1e-6f);
+  EXPECT_NEAR(load_image(folder / "a.png").pixels[1].r, 0.5f, 0.005f);
+  EXPECT_TRUE(load_alpha(folder / "a.png").empty());
+  save_image(folder / "a.exr", image);
+  EXPECT_EQ(load_image(folder / "a.exr", ImageEncoding::data).pixels, image.pixels);
+  // A TGA of two pixels, blue green red alpha, from the top left. Colours are not darkened.
+  std::string tga(18, '\0');
+  tga[2] = 2, tga[12] = 2, tga[14] = 1, tga[16] = 32, tga[17] = 0x28;
+  for (const int byte : {0, 0, 255, 255, 255, 0, 0, 51}) tga += static_cast<char>(byte);
+  std::ofstream(folder / "a.tga", std::ios::binary) << tga;
+  EXPECT_EQ(load_image(folder / "a.tga").pixels[1], (Rgb{0, 0, 1}));
+  const std::vector<float> alpha = load_alpha(folder / "a.tga");
+  ASSERT_EQ(alpha.size(), 2u);
+  EXPECT_EQ(alpha[0], 1);
+  EXPECT_NEAR(alpha[1], 0.2f, 1e-6f);
+  EXPECT_EQ(kind_of(folder / "none.png", [&] { load_alpha(folder / "none.png"); }),
+            ErrorKind::missing);
 }
 
 // RGBE: a common exponent and 8 bits, cut off: a channel is low by less than 2^-7 of the largest

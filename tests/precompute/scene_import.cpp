@@ -212,31 +212,114 @@ TEST_F(SceneImport, GltfNormalsStayAcrossTheirSurface) {
   for (const Vec3& n : scene.normal) expect_near(n, normalize(Vec3{-0.8, 0.2, 0}));
 }
 
-TEST_F(SceneImport, GltfMaterialsBecomeLambertAndPhong) {
-  const auto material = [&](const std::string& pbr) {
-    const Scene scene =
-        import("m.gltf", gltf(R"({"mesh":0})",
-                              R"(,"materials":[{"name":"m","pbrMetallicRoughness":)" + pbr + "}]",
-                              R"(,"material":0)"));
+TEST_F(SceneImport, GltfMaterialsKeepTheirNumbers) {
+  const auto material = [&](const std::string& text, SceneReport* report = nullptr) {
+    const Scene scene = import(
+        "m.gltf", gltf(R"({"mesh":0})", R"(,"materials":[)" + text + "]", R"(,"material":0)"));
+    if (report) *report = scene.report;
     return scene.material[scene.triangle[0].material];
   };
-  // Rough plastic: too wide a lobe, its 4 % are in the albedo. Factors are linear.
-  const Material rough = material(
-      R"({"baseColorFactor":[0.5,0.25,0.125,1],"metallicFactor":0,"roughnessFactor":0.9})");
-  expect_near(rough.albedo, {0.54f, 0.29f, 0.165f});
-  expect_near(rough.specular, {0, 0, 0});
-  // Smooth plastic, r = 0.5: a = 0.25, e = (2 / 0.0625 - 2) / 4 = 7.5.
-  const Material plastic = material(
-      R"({"baseColorFactor":[0.5,0.25,0.125,1],"metallicFactor":0,"roughnessFactor":0.5})");
-  expect_near(plastic.albedo, {0.5f, 0.25f, 0.125f});
-  expect_near(plastic.specular, {0.04f, 0.04f, 0.04f});
-  EXPECT_NEAR(plastic.exponent, 7.5f, 1e-4f);
-  // Smooth metal: all of the colour is in the lobe.
-  const Material metal =
-      material(R"({"baseColorFactor":[0.9,0.6,0.3,1],"metallicFactor":1,"roughnessFactor":0.0})");
-  expect_near(metal.albedo, {0, 0, 0});
-  expect_near(metal.specular, {0.9f, 0.6f, 0.3f});
-  EXPECT_EQ(metal.exponent, 1e4f);
+  const Material plain = material(R"({"name":"m"})");  // the defaults of glTF
+  EXPECT_EQ(plain.model, SurfaceModel::metallic_roughness);
+  expect_near(plain.albedo, {1, 1, 1});
+  EXPECT_EQ(plain.metallic, 1);
+  EXPECT_EQ(plain.roughness, 1);
+  EXPECT_EQ(plain.ior, 1.5f);
+  EXPECT_EQ(plain.alpha_cutoff, 0);
+  // Factors are linear; what is out of bounds comes in, null (a NaN, once written) is the default.
+  const Material bounded =
+      material(R"({"pbrMetallicRoughness":{"baseColorFactor":[0.5,7,null,1],"metallicFactor":null,)"
+               R"("roughnessFactor":-3},"extensions":{"KHR_materials_ior":{"ior":2.4}}})");
+  expect_near(bounded.albedo, {0.5f, 1, 1});
+  EXPECT_EQ(bounded.metallic, 1);
+  EXPECT_EQ(bounded.roughness, 0);
+  EXPECT_EQ(bounded.ior, 2.4f);
+  // Transmission without a volume is a thin wall; with one of no thickness, too.
+  SceneReport report;
+  for (const char* volume : {"", R"(,"KHR_materials_volume":{"attenuationDistance":2})"}) {
+    const Material thin = material(
+        std::string(R"({"pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":0.3},)"
+                    R"("extensions":{"KHR_materials_transmission":{"transmissionFactor":0.75})") +
+            volume + "}}",
+        &report);
+    EXPECT_EQ(thin.model, SurfaceModel::metallic_roughness);
+    EXPECT_EQ(thin.transmission, 0.75f);
+    EXPECT_EQ(report.rough_glass, 1);
+  }
+  // White is (1, 0.5, 0.25) after 2 m: extinction ln 2 / 2 and ln 4 / 2.
+  const Material glass = material(
+      R"({"pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":0},"extensions":{)"
+      R"("KHR_materials_transmission":{"transmissionFactor":1},"KHR_materials_ior":{"ior":1.33},)"
+      R"("KHR_materials_volume":{"thicknessFactor":0.1,"attenuationDistance":2,)"
+      R"("attenuationColor":[1,0.5,0.25]}}})",
+      &report);
+  EXPECT_EQ(glass.model, SurfaceModel::glass);
+  EXPECT_FALSE(glass.thin);
+  EXPECT_EQ(glass.ior, 1.33f);
+  expect_near(glass.extinction, {0, 0.34657359f, 0.69314718f});
+  EXPECT_EQ(report.rough_glass, 0);
+}
+
+// An even blend: 1 - alpha goes straight through, alpha of the colour is left.
+TEST_F(SceneImport, GltfBlendingWithoutTextureIsAThinWall) {
+  const Scene scene =
+      import("b.gltf", gltf(R"({"mesh":0})",
+                            R"(,"materials":[{"alphaMode":"BLEND","pbrMetallicRoughness":)"
+                            R"({"baseColorFactor":[0.2,0.2,0.2,0.25],"metallicFactor":0}}])",
+                            R"(,"material":0)"));
+  const Material& m = scene.material[scene.triangle[0].material];
+  EXPECT_EQ(scene.report.blended_materials, 1);
+  expect_near(m.albedo * m.transmission, {0.75f, 0.75f, 0.75f});
+  expect_near(m.albedo * (1 - m.transmission), {0.05f, 0.05f, 0.05f});
+  EXPECT_EQ(m.alpha_cutoff, 0);
+}
+
+TEST_F(SceneImport, ObjModelsOfIllumination) {
+  const auto material = [&](const std::string& lines, SceneReport* report = nullptr) {
+    write("i.mtl", "newmtl m\n" + lines);
+    const Scene scene =
+        import("i.obj", "mtllib i.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n");
+    if (report) *report = scene.report;
+    return scene.material[scene.triangle[0].material];
+  };
+  for (const char* illum : {"3", "5"}) {
+    const Material shiny =
+        material(std::string("Kd 0.1 0.1 0.1\nKs 0.9 0.8 0.7\nillum ") + illum + "\n");
+    EXPECT_EQ(shiny.model, SurfaceModel::mirror);
+    expect_near(shiny.albedo, {0.9f, 0.8f, 0.7f});
+  }
+  const Material black_ks = material("Kd 0.6 0.5 0.4\nKs 0 0 0\nillum 3\n");
+  expect_near(black_ks.albedo, {0.6f, 0.5f, 0.4f});
+  for (const char* illum : {"4", "6", "7", "9"}) {
+    const Material glass = material(
+        std::string("Kd 0 0 0\nKs 1 1 1\nTf 0.5 2 0.25\nNi 2.5\nd 0.1\nillum ") + illum + "\n");
+    EXPECT_EQ(glass.model, SurfaceModel::glass);
+    EXPECT_FALSE(glass.thin);
+    EXPECT_EQ(glass.ior, 2.5f);
+    expect_near(glass.albedo, {0.5f, 1, 0.25f});
+    EXPECT_EQ(glass.alpha_cutoff, 0);
+  }
+  expect_near(material("Tf 0 0 0\nillum 7\n").albedo, {1, 1, 1});
+  expect_near(material("illum 7\n").albedo, {1, 1, 1});
+  EXPECT_EQ(material("illum 7\n").ior, 1.5f);
+  const Material metal = material("Kd 0.9 0.6 0.3\nPm 1\nPr 0.25\nillum 2\n");
+  EXPECT_EQ(metal.model, SurfaceModel::metallic_roughness);
+  EXPECT_EQ(metal.metallic, 1);
+  EXPECT_EQ(metal.roughness, 0.25f);
+  // More than all light, in one channel: both parts are scaled by the same.
+  SceneReport report;
+  const Material bright = material("Kd 0.5 0.75 0.1\nKs 0.5 0.75 0.4\nNs 10\nillum 2\n", &report);
+  EXPECT_EQ(bright.model, SurfaceModel::phong);
+  EXPECT_EQ(report.energy_scaled, 1);
+  expect_near(bright.albedo, {1 / 3.0f, 0.5f, 0.1f / 1.5f});
+  expect_near(bright.specular, {1 / 3.0f, 0.5f, 0.4f / 1.5f});
+  material("Kd 0.7 0.6 0.1\nKs 0.3 0.4 0.4\nNs 10\nillum 2\n", &report);
+  EXPECT_EQ(report.energy_scaled, 0);
+  // See-through below one half.
+  EXPECT_GT(material("Kd 1 1 1\nd 0.4\n", &report).alpha_cutoff, 1);
+  EXPECT_EQ(report.blended_materials, 1);
+  EXPECT_EQ(material("Kd 1 1 1\nd 0.6\n", &report).alpha_cutoff, 0);
+  EXPECT_EQ(report.blended_materials, 1);
 }
 
 TEST_F(SceneImport, TexturesInsideAndBesideTheFile) {
@@ -275,6 +358,90 @@ TEST_F(SceneImport, TexturesInsideAndBesideTheFile) {
                            "usemtl m\nf 1/1 2/2 3/3\n");
   EXPECT_EQ(obj.texture.size(), 1u);
   expect_near(obj.material[obj.triangle[0].material].albedo, {0.5f, 1, 1});
+}
+
+// Colours are sRGB, everything else is plain numbers; one picture may be both.
+TEST_F(SceneImport, GltfTexturesOfDataAreNotTakenAsColors) {
+  Image half(1, 1);
+  half.pixels[0] = {1, 0.25f, 0};
+  save_image(folder_ / "t.png", half);
+  const Scene scene = import(
+      "d.gltf", gltf(R"({"mesh":0})",
+                     R"(,"images":[{"uri":"t.png"}],"textures":[{"source":0}],"materials":[{)"
+                     R"("normalTexture":{"index":0,"scale":0.5},"pbrMetallicRoughness":{)"
+                     R"("baseColorTexture":{"index":0},"metallicRoughnessTexture":{"index":0}}}])",
+                     R"(,"material":0)"));
+  EXPECT_EQ(scene.report.textures_missing, 0);
+  const Material& m = scene.material[scene.triangle[0].material];
+  ASSERT_EQ(scene.texture.size(), 2u);
+  EXPECT_EQ(m.texture, 0);
+  EXPECT_EQ(m.normal_texture, 1);
+  EXPECT_EQ(m.metallic_roughness_texture, 1);
+  EXPECT_EQ(m.normal_scale, 0.5f);
+  EXPECT_TRUE(scene.alpha.empty());
+  expect_near(scene.texture[0].pixels[0], {1, 0.25f, 0}, 0.005f);
+  expect_near(scene.texture[1].pixels[0], {1, 137 / 255.0f, 0});  // 0.25 in sRGB
+}
+
+// Two pixels side by side, alpha 1 and 0.2, written by hand: 8-bit RGBA as an uncompressed TGA.
+std::string tga_with_alpha() {
+  std::string tga(18, '\0');
+  tga[2] = 2, tga[12] = 2, tga[14] = 1, tga[16] = 32, tga[17] = 0x28;  // top left, 8 bits alpha
+  for (const int byte : {255, 255, 255, 255, 255, 255, 255, 51}) tga += static_cast<char>(byte);
+  return tga;
+}
+
+TEST_F(SceneImport, AlphaOfTexturesMakesHoles) {
+  write("a.tga", tga_with_alpha());
+  const auto alpha_scene = [&](const std::string& mode, const std::string& factor) {
+    return import("a.gltf",
+                  gltf(R"({"mesh":0})",
+                       R"(,"images":[{"uri":"a.tga"}],"textures":[{"source":0}],"materials":[{)" +
+                           mode + R"("pbrMetallicRoughness":{"baseColorFactor":[1,1,1,)" + factor +
+                           R"(],"baseColorTexture":{"index":0}}}])",
+                       R"(,"material":0)"));
+  };
+  const auto check = [](const Scene& scene) {
+    ASSERT_EQ(scene.texture.size(), 1u);
+    ASSERT_EQ(scene.alpha.size(), 1u);
+    ASSERT_EQ(scene.alpha[0].size(), 2u);
+    EXPECT_EQ(scene.alpha[0][0], 1);
+    EXPECT_NEAR(scene.alpha[0][1], 0.2f, 1e-6f);
+  };
+  const Scene mask = alpha_scene(R"("alphaMode":"MASK","alphaCutoff":0.25,)", "0.5");
+  check(mask);
+  // 0.5 alpha < 0.25.
+  EXPECT_EQ(mask.material[0].alpha_cutoff, 0.5f);
+  EXPECT_EQ(mask.report.blended_materials, 0);
+  const Scene blend = alpha_scene(R"("alphaMode":"BLEND",)", "1");
+  check(blend);
+  EXPECT_EQ(blend.material[0].alpha_cutoff, 0.5f);
+  EXPECT_EQ(blend.report.blended_materials, 1);
+  const Scene opaque = alpha_scene("", "1");
+  EXPECT_TRUE(opaque.alpha.empty());
+  EXPECT_EQ(opaque.material[0].alpha_cutoff, 0);
+
+  // map_d of another size than map_Kd, and without one.
+  Image colors(4, 2);
+  for (Rgb& p : colors.pixels) p = {0, 1, 0};
+  save_image(folder_ / "kd.png", colors);
+  for (const char* kd : {"map_Kd kd.png\n", ""}) {
+    write("a.mtl", std::string("newmtl m\nKd 1 1 1\nmap_d a.tga\n") + kd);
+    const Scene obj = import("a.obj",
+                             "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
+                             "usemtl m\nf 1/1 2/2 3/3\n");
+    const Material& m = obj.material[obj.triangle[0].material];
+    EXPECT_EQ(m.alpha_cutoff, 0.5f);
+    EXPECT_EQ(obj.report.blended_materials, 1);
+    ASSERT_GE(m.texture, 0);
+    const auto index = static_cast<std::size_t>(m.texture);
+    ASSERT_EQ(obj.alpha.size(), obj.texture.size());
+    const Image& image = obj.texture[index];
+    ASSERT_EQ(obj.alpha[index].size(), image.pixels.size());
+    expect_near(image.at(0, 0), *kd ? Rgb{0, 1, 0} : Rgb{1, 1, 1});
+    EXPECT_GT(obj.alpha[index].front(), 0.75f);
+    EXPECT_LT(obj.alpha[index].back(), 0.45f);
+  }
 }
 
 TEST_F(SceneImport, GltfCameraStandsWhereItsNodesPutIt) {

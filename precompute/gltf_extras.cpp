@@ -1,7 +1,6 @@
-// What glTF files say and the scene reader gets wrong: the camera, and how many materials there
-// are.
+// What glTF files say and the scene reader gets wrong or leaves out.
 
-#include "precompute/gltf_camera.h"
+#include "precompute/gltf_extras.h"
 
 #include <fmt/format.h>
 
@@ -135,7 +134,7 @@ GltfExtras read_gltf_extras(const std::filesystem::path& file) {
   try {
     const json parsed = json::parse(json_text(file));
     GltfExtras extras;
-    if (parsed.contains("materials")) extras.materials = parsed.at("materials").size();
+    extras.material = gltf_materials(parsed);
     extras.camera = find_camera(parsed);
     return extras;
   } catch (const json::exception&) {

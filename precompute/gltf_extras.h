@@ -1,25 +1,26 @@
-// What glTF files say and the scene reader gets wrong: the camera, and how many materials there
-// are.
+// What glTF files say and the scene reader gets wrong or leaves out: the camera and the numbers of
+// materials.
 
 #pragma once
 
-#include <cstddef>
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "core/camera.h"
+#include "precompute/gltf_materials.h"
 
 namespace haarlight {
 
 struct GltfExtras {
   std::optional<Camera> camera;  ///< the first perspective camera that a node of the scene carries
-  std::size_t materials = 0;     ///< in the file; the reader adds a default one behind them
+  std::vector<GltfMaterial> material;  ///< of the file; the reader adds a default one behind them
 };
 
 /// Reads the JSON of a .gltf or .glb file directly: assimp 5.2 moves cameras twice and stretches
 /// the field of view in a way that changed between its versions. glTF 2.0 specification, sections
-/// 3.5.3 (node transforms), 3.10 (cameras) and 4.4 (the GLB container). Throws Error{format} if
-/// the file is not glTF, Error{io} if it cannot be read.
+/// 3.5.3 (node transforms), 3.9 (materials), 3.10 (cameras) and 4.4 (the GLB container). Throws
+/// Error{format} if the file is not glTF, Error{io} if it cannot be read.
 GltfExtras read_gltf_extras(const std::filesystem::path& file);
 
 }  // namespace haarlight
