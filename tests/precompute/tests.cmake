@@ -16,3 +16,5 @@ haarlight_test(precompute/effects haarlight_precompute)
 haarlight_test(precompute/interreflection haarlight_precompute)
 haarlight_test(precompute/row_products haarlight_precompute)
 haarlight_test(precompute/sparse_directions haarlight_precompute)
+haarlight_test(precompute/transport_against_reference haarlight_reference haarlight_precompute
+  haarlight_data_gen)

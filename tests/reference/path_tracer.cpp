@@ -325,7 +325,7 @@ RgbD PathTracer::path(Vec3 origin, Vec3 direction, Random& random) const {
                                    std::exp(-extinction.b * hit->distance)};
     Surface s = surface(*hit, direction);
     if (scattered > options_.max_bounces) s.diffuse_chance = s.gloss_chance = 0;
-    if (!options_.specular || (scattered > 0 && !options_.caustics)) s.delta = {};
+    if (!(scattered == 0 ? options_.specular : options_.caustics)) s.delta = {};
     double sum = s.diffuse_chance + s.gloss_chance + s.delta[0].chance + s.delta[1].chance;
     if (!(sum > 0)) return light;
     for (double* chance :

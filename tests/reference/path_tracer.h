@@ -24,12 +24,12 @@ namespace haarlight::reference {
 struct PathOptions {
   int samples = 64;          ///< paths a pixel, >= 2
   int max_bounces = 10'000;  ///< 0: direct light only
-  bool shadows = true;   ///< off: all of the sky above the horizon reaches a surface; no bounces
-  bool gloss = true;     ///< off: no lobes
-  bool specular = true;  ///< off: mirrors and glass are black
-  bool caustics = true;  ///< off: mirrors and glass are black to all but the camera's line of sight
-  bool next_event = true;      ///< aims at the sky too (where it can be aimed at)
-  bool background = false;     ///< lines of sight that meet nothing show the sky, otherwise black
+  bool shadows = true;      ///< off: all of the sky above the horizon reaches a surface; no bounces
+  bool gloss = true;        ///< off: no lobes
+  bool specular = true;     ///< off: mirrors and glass are black in the picture
+  bool caustics = true;     ///< off: they are black to all other surfaces
+  bool next_event = true;   ///< aims at the sky too (where it can be aimed at)
+  bool background = false;  ///< lines of sight that meet nothing show the sky, otherwise black
   bool pixel_centers = false;  ///< lines of sight through the middle of pixels, or all over them
   std::uint64_t seed = 1;
 };

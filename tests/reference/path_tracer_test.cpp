@@ -324,7 +324,8 @@ TEST(PathTracer, OptionsSwitchEffectsOff) {
   expect(seen([](PathOptions& o) { o.max_bounces = 0; }),
          0.5 * (0.5 + 0.5 * static_cast<double>(0.7f)));
   expect(seen([](PathOptions& o) { o.caustics = false; }), 0.25);
-  expect(seen([](PathOptions& o) { o.specular = false; }), 0.25);
+  expect(seen([](PathOptions& o) { o.specular = false; }),
+         0.5 * (0.5 + 0.5 * static_cast<double>(0.7f)));
   expect(seen([](PathOptions& o) { o.shadows = false; }), 0.5);
   // The mirror itself is seen, caustics or not: it shows the ground, half dark without them.
   PathOptions options;
@@ -332,6 +333,9 @@ TEST(PathTracer, OptionsSwitchEffectsOff) {
   options.caustics = false;
   expect(PathTracer(scene, sky, options).radiance({1, 1, 0}, normalize({-1, -0.5, 0})),
          static_cast<double>(0.7f) * 0.25);
+  options.specular = false;
+  EXPECT_EQ(PathTracer(scene, sky, options).radiance({1, 1, 0}, normalize({-1, -0.5, 0})).mean,
+            RgbD{});
 }
 
 TEST(PathTracer, HolesLetLightPass) {
