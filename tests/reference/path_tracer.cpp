@@ -378,15 +378,19 @@ class Gather {
     ++count_;
     const RgbD off = value - mean_;
     mean_ += off * (1.0 / count_);
-    squares_ += off * (value - mean_);
+    const RgbD still_off = value - mean_;
+    squares_ += off * still_off;
+    sum_squares_ += (off.r + off.g + off.b) * (still_off.r + still_off.g + still_off.b);
   }
   Estimate estimate() const {
-    return {mean_, squares_ * (1.0 / count_ / std::max(1.0, count_ - 1.0))};
+    const double scale = 1.0 / count_ / std::max(1.0, count_ - 1.0);
+    return {mean_, squares_ * scale, sum_squares_ * scale};
   }
 
  private:
   double count_ = 0;
   RgbD mean_, squares_;
+  double sum_squares_ = 0;
 };
 
 }  // namespace

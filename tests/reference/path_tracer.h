@@ -37,7 +37,8 @@ struct PathOptions {
 /// A mean over paths.
 struct Estimate {
   RgbD mean;
-  RgbD variance;  ///< of the mean, estimated from the spread of the paths
+  RgbD variance;            ///< of the mean, estimated from the spread of the paths
+  double sum_variance = 0;  ///< of the sum of its channels, which rise and fall together
 };
 
 /// Keeps references to scene and sky. Immutable, shared by all threads. Of materials it knows all
