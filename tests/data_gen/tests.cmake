@@ -3,3 +3,4 @@ haarlight_test(data_gen/mesh_builder haarlight_data_gen haarlight_core)
 haarlight_test(data_gen/projections haarlight_data_gen haarlight_wavelet haarlight_core)
 haarlight_test(data_gen/scenes haarlight_data_gen haarlight_reference haarlight_core
   nlohmann_json::nlohmann_json)
+haarlight_test(data_gen/round_trip haarlight_data_gen haarlight_precompute haarlight_core)
