@@ -1,7 +1,5 @@
 // haarlight precompute: traces a scene's transport for one view and writes it to a file.
 
-#include "precompute/precompute.h"
-
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -17,6 +15,7 @@
 #include "apps/verbs.h"
 #include "core/error.h"
 #include "precompute/default_stage.h"
+#include "precompute/precompute_mesh.h"
 #include "precompute/scene_import.h"
 
 namespace haarlight {
@@ -28,12 +27,14 @@ struct PrecomputeCommand {
   std::filesystem::path scene, output;
   View view = View::automatic;
   StageOptions stage;
-  PrecomputeOptions options;
+  MeshOptions options;
+  bool vertices = false;
 
   void run();
 
  private:
   void print_summary(const Stage& made, const PrecomputeReport& report) const;
+  void print_mesh(const MeshReport& report) const;
 };
 
 void PrecomputeCommand::run() {
@@ -52,9 +53,14 @@ void PrecomputeCommand::run() {
 
   try {
     ProgressPrinter progress("precompute");
-    const PrecomputeReport report = precompute_image(imported, made.camera, options, output,
-                                                     [&](double share) { return progress(share); });
-    print_summary(made, report);
+    const Progress show = [&](double share) { return progress(share); };
+    if (vertices) {
+      const MeshReport report = precompute_mesh(imported, made.camera, options, output, show);
+      print_summary(made, report.run);
+      print_mesh(report);
+    } else {
+      print_summary(made, precompute_image(imported, made.camera, options, output, show));
+    }
   } catch (const Error& error) {
     if (error.kind() != ErrorKind::cancelled) throw;
     const std::filesystem::path journal = output.string() + ".partial";
@@ -77,6 +83,20 @@ void PrecomputeCommand::print_summary(const Stage& made, const PrecomputeReport&
              static_cast<double>(report.rays) * 1e-6, report.seconds, report.measured_error);
   if (report.resumed_tiles > 0) {
     fmt::print("{} of {} tiles were there already\n", report.resumed_tiles, report.tiles);
+  }
+}
+
+void PrecomputeCommand::print_mesh(const MeshReport& report) const {
+  const SubdivideReport& s = report.subdivision;
+  fmt::print("{} vertices, {} triangles", s.vertices, s.triangles);
+  if (s.split_edges > 0) {
+    fmt::print(", {} edges split in {:.1f} s where the light changes", s.split_edges,
+               report.subdivision_seconds);
+  }
+  fmt::print("\n");
+  if (report.view_dependent > 0) {
+    fmt::print("{} vertices are glossy, mirrors or glass: their diffuse part alone is kept\n",
+               report.view_dependent);
   }
 }
 
@@ -126,6 +146,20 @@ Verb add_precompute(CLI::App& verb) {
              "relative RMSE of the picture that compression may cost; 0 keeps all")
       ->group("Accuracy");
 
+  CLI::Option* per_vertex =
+      verb.add_flag("--vertices", c.vertices,
+                    "light of the mesh's vertices, to be seen from anywhere, instead of one view's "
+                    "pixels; --view and --size say how it is shown first")
+          ->group("Mesh");
+  add_choice<bool>(verb, "--subdivide", c.options.subdivide, {{"auto", true}, {"off", false}},
+                   "auto: split triangles where visibility changes by more than 5 x --error")
+      ->needs(per_vertex)
+      ->group("Mesh");
+  add_integer(verb, "--max-vertices", c.options.max_vertices, 1, 100'000'000,
+              "that subdivision may lead to")
+      ->needs(per_vertex)
+      ->group("Mesh");
+
   add_threads(verb)->group("Running");
   verb.add_flag("--resume", c.options.resume,
                 "go on with FILE.hlt.partial of a run that was cut off, if it is there and fits")
@@ -137,6 +171,7 @@ Verb add_precompute(CLI::App& verb) {
       "The file appears when it is complete; until then the part done is in FILE.hlt.partial.\n\n"
       "Examples:\n"
       "  haarlight precompute bunny.obj -o bunny.hlt\n"
+      "  haarlight precompute bunny.obj -o mesh.hlt --vertices --face 32\n"
       "  haarlight precompute room.glb -o room.hlt --size 1280x720 --error 0.005\n"
       "  haarlight precompute room.glb -o room.hlt --size 1280x720 --error 0.005 --resume");
   return [command] { command->run(); };

@@ -94,9 +94,9 @@ PrecomputeReport run_tiles(const TileSource& source, const TileRun& run, const R
   check(options);
   check_output(file);
 
-  const std::vector<std::uint32_t> order = image_row_order(run.info.width, run.info.height);
+  const std::vector<std::uint32_t> order = row_order(run.info);
   PrecomputeReport report;
-  report.tiles = ((run.info.width + 7) / 8) * ((run.info.height + 7) / 8);
+  report.tiles = used_tiles(order);
 
   // Pilot tiles say how much may be dropped.
   Steps steps(progress, report.tiles + kPilotTiles);

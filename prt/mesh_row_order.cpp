@@ -93,4 +93,10 @@ std::vector<std::uint32_t> row_order(const TransportInfo& info) {
                    : image_row_order(info.width, info.height);
 }
 
+int used_tiles(std::span<const std::uint32_t> order) {
+  std::size_t rows = order.size();
+  while (rows > 0 && order[rows - 1] == kNoOutput) --rows;
+  return static_cast<int>((rows + kTileRows - 1) / kTileRows);
+}
+
 }  // namespace haarlight

@@ -23,13 +23,6 @@ namespace {
 constexpr auto kRows = static_cast<std::size_t>(kTileRows);
 constexpr auto kTiles = static_cast<std::size_t>(kChunkTiles);
 
-// Tiles up to the last with a row in use.
-int used_tiles(std::span<const std::uint32_t> order) {
-  std::size_t rows = order.size();
-  while (rows > 0 && order[rows - 1] == kNoOutput) --rows;
-  return static_cast<int>((rows + kRows - 1) / kRows);
-}
-
 JournalHead head_of(const TransportInfo& info, const TransportWriterOptions& options, int tiles) {
   JournalHead head;
   head.info = info;

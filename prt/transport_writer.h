@@ -31,6 +31,9 @@ std::vector<std::uint32_t> mesh_row_order(const TransportMesh& mesh, int terms =
 /// image_row_order or mesh_row_order, by the kind.
 std::vector<std::uint32_t> row_order(const TransportInfo& info);
 
+/// Tiles up to the last that has a row in use; what follows is padding.
+int used_tiles(std::span<const std::uint32_t> order);
+
 /// One tile of exact rows as precomputation makes them: Haar coefficients of
 ///   t[k] = integral over texel k of V f_r cos dw   (f_r without the row's colour if grey).
 struct TileRows {

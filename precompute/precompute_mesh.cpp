@@ -1,0 +1,125 @@
+// The offline main path for meshes: a scene in, a transport of its vertices out.
+
+#include "precompute/precompute_mesh.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "precompute/fingerprint.h"
+#include "precompute/mesh_tiles.h"
+#include "precompute/run_checks.h"
+#include "precompute/scene_meta.h"
+#include "precompute/tile_run.h"
+#include "precompute/vertex_sampler.h"
+
+namespace haarlight {
+namespace {
+
+// Part of the fingerprint: raised whenever the same input would give other vertices.
+constexpr int kVertexVersion = 1;
+
+constexpr double kSubdivisionShare = 0.1;  // of the progress shown
+
+std::string meta_json(const Scene& scene, const MeshOptions& options, const MeshReport& report) {
+  const TraceOptions& t = options.trace;
+  const nlohmann::json meta{{"generator", fmt::format("haarlight tracer {}", kTracerVersion)},
+                            {"scene", scene_meta(scene)},
+                            {"options",
+                             {{"face", t.face_size},
+                              {"spp", t.spp},
+                              {"adaptive", t.adaptive},
+                              {"error", options.error},
+                              {"noise", t.noise},
+                              {"paths", t.paths},
+                              {"seed", t.seed},
+                              {"subdivide", options.subdivide},
+                              {"max_vertices", options.max_vertices}}},
+                            {"view_dependent_vertices", report.view_dependent},
+                            {"effects", to_string(t.effects)}};
+  return meta.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+}  // namespace
+
+TransportMesh transport_mesh(const Scene& scene) {
+  TransportMesh mesh;
+  if (scene.position.empty()) return mesh;
+  Vec3 low = scene.position[0], high = low;
+  for (const Vec3& p : scene.position) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+  mesh.origin = 0.5 * (low + high);
+  const auto narrow = [](const Vec3& v) {
+    return std::array<float, 3>{static_cast<float>(v.x), static_cast<float>(v.y),
+                                static_cast<float>(v.z)};
+  };
+  mesh.material.assign(scene.position.size(), 0);
+  for (std::size_t v = 0; v < scene.position.size(); ++v) {
+    mesh.position.push_back(narrow(scene.position[v] - mesh.origin));
+    mesh.normal.push_back(narrow(scene.normal[v]));
+  }
+  for (const Triangle& t : scene.triangle) {
+    mesh.triangle.push_back(t.vertex);
+    for (const std::uint32_t v : t.vertex) mesh.material[v] = t.material;
+  }
+  return mesh;
+}
+
+std::string mesh_fingerprint(const Scene& scene, const Camera& camera, const MeshOptions& options) {
+  ContentHash hash;
+  hash.add(kVertexVersion);
+  hash.add(precompute_fingerprint(scene, camera, options));
+  hash.add(options.subdivide), hash.add(options.max_vertices);
+  return hash.text();
+}
+
+MeshReport precompute_mesh(const Scene& scene, const Camera& camera, const MeshOptions& options,
+                           const std::filesystem::path& file, const Progress& progress) {
+  check(static_cast<const RunOptions&>(options));
+  check(options.trace);
+  check(camera);
+  check_output(file);
+  MeshReport report;
+
+  // More vertices where the light on them changes.
+  const Visibility visibility(scene);
+  const auto start = std::chrono::steady_clock::now();
+  SubdivideOptions finer;
+  finer.tolerance = std::max(0.01, 5 * options.error);
+  finer.max_vertices = options.max_vertices;
+  const double first = options.subdivide ? kSubdivisionShare : 0;
+  const auto subdividing = [&](double share) { return !progress || progress(first * share); };
+  const Scene fine = options.subdivide
+                         ? subdivide(scene, visibility, finer, &report.subdivision, subdividing)
+                         : scene;
+  report.subdivision.vertices = static_cast<std::int64_t>(fine.position.size());
+  report.subdivision.triangles = static_cast<std::int64_t>(fine.triangle.size());
+  report.subdivision_seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+
+  const VertexSampler sampler(fine, visibility);
+  report.view_dependent = sampler.view_dependent();
+  const MeshTiles tiles(sampler, scene, visibility, options.trace);
+  TileRun run;
+  run.info.kind = TransportKind::mesh;
+  run.info.face_size = options.trace.face_size;
+  run.info.width = camera.width;
+  run.info.height = camera.height;
+  run.info.camera = camera;
+  run.info.mesh = std::make_shared<const TransportMesh>(transport_mesh(fine));
+  run.fingerprint = mesh_fingerprint(scene, camera, options);
+  run.meta = meta_json(scene, options, report);
+  const auto tracing = [&](double share) {
+    return !progress || progress(first + (1 - first) * share);
+  };
+  report.run = run_tiles(tiles, run, options, file, tracing);
+  return report;
+}
+
+}  // namespace haarlight
