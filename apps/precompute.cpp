@@ -152,7 +152,7 @@ Verb add_precompute(CLI::App& verb) {
                     "pixels; --view and --size say how it is shown first")
           ->group("Mesh");
   add_choice<bool>(verb, "--subdivide", c.options.subdivide, {{"auto", true}, {"off", false}},
-                   "auto: split triangles where visibility changes by more than 5 x --error")
+                   "auto: split triangles where visibility changes by more than --error")
       ->needs(per_vertex)
       ->group("Mesh");
   add_integer(verb, "--max-vertices", c.options.max_vertices, 1, 100'000'000,

@@ -91,7 +91,7 @@ MeshReport precompute_mesh(const Scene& scene, const Camera& camera, const MeshO
   const Visibility visibility(scene);
   const auto start = std::chrono::steady_clock::now();
   SubdivideOptions finer;
-  finer.tolerance = std::max(0.01, 5 * options.error);
+  finer.tolerance = std::max(0.005, options.error);
   finer.max_vertices = options.max_vertices;
   const double first = options.subdivide ? kSubdivisionShare : 0;
   const auto subdividing = [&](double share) { return !progress || progress(first * share); };

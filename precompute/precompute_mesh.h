@@ -18,7 +18,7 @@ namespace haarlight {
 /// How a transport per vertex is made.
 struct MeshOptions : PrecomputeOptions {
   bool subdivide = true;       ///< where visibility changes; see precompute/subdivide.h.
-                               ///< The tolerance there is 5 times `error`, at least 0.01
+                               ///< The tolerance there is `error`, at least 0.005
   int max_vertices = 100'000;  ///< that subdivision may lead to
 };
 

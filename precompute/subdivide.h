@@ -11,7 +11,7 @@
 namespace haarlight {
 
 struct SubdivideOptions {
-  double tolerance = 0.05;    ///< difference of what two ends of an edge see, in shares of their
+  double tolerance = 0.01;    ///< difference of what two ends of an edge see, in shares of their
                               ///< unshadowed irradiance under an even sky, above which it is split;
                               ///< above 0
   double longest = 1.0 / 24;  ///< of the scene's diameter: longer edges are split in any case, so

@@ -18,3 +18,6 @@ haarlight_test(precompute/row_products haarlight_precompute)
 haarlight_test(precompute/sparse_directions haarlight_precompute)
 haarlight_test(precompute/transport_against_reference haarlight_reference haarlight_precompute
   haarlight_data_gen)
+haarlight_test(precompute/precompute_mesh haarlight_precompute)
+haarlight_test(precompute/subdivide haarlight_precompute)
+haarlight_test(precompute/vertex_sampler haarlight_precompute)
