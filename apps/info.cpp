@@ -69,13 +69,19 @@ Json describe(const std::filesystem::path& file, const Transport& transport) {
   out["file"] = file.string();
   out["file_bytes"] = transport.file_bytes();
   out["chunk_bytes"] = transport.chunk_bytes();
+  out["kind"] = info.mesh ? "mesh" : "image";
+  if (info.mesh) {
+    out["vertices"] = info.mesh->position.size();
+    out["triangles"] = info.mesh->triangle.size();
+    out["terms"] = info.terms;
+  }
   out["face_size"] = info.face_size;
   out["coefficients"] = transport.layout().size();
   out["width"] = info.width;
   out["height"] = info.height;
   out["rows"] = rows;
   out["rows_stored"] = transport.rows();
-  out["pixels_covered"] = covered;
+  if (!info.mesh) out["pixels_covered"] = covered;
   out["camera"] = {{"position_m", {position.x, position.y, position.z}},
                    {"forward", {forward.x, forward.y, forward.z}},
                    {"vertical_fov_degrees", info.camera.vertical_fov * 180 / kPi}};
@@ -97,8 +103,16 @@ void print_text(const Json& d) {
     fmt::print("{:<22}{}\n", name, value);
   };
   line("file", fmt::format("{}, {}", d["file"].get<std::string>(), mebibytes(d["file_bytes"])));
-  line("picture", fmt::format("{}x{} pixels, {} of them show the scene", d["width"].get<int>(),
-                              d["height"].get<int>(), d["pixels_covered"].get<std::int64_t>()));
+  const bool mesh = d["kind"] == "mesh";
+  if (mesh) {
+    line("mesh", fmt::format("{} vertices, {} triangles, {} term{} a vertex; shown at {}x{} pixels",
+                             d["vertices"].get<std::int64_t>(), d["triangles"].get<std::int64_t>(),
+                             d["terms"].get<int>(), d["terms"] == 1 ? "" : "s",
+                             d["width"].get<int>(), d["height"].get<int>()));
+  } else {
+    line("picture", fmt::format("{}x{} pixels, {} of them show the scene", d["width"].get<int>(),
+                                d["height"].get<int>(), d["pixels_covered"].get<std::int64_t>()));
+  }
   line("lighting", fmt::format("6x{0}x{0} texels, {1} coefficients", d["face_size"].get<int>(),
                                d["coefficients"].get<int>()));
   const Json& camera = d["camera"];
@@ -109,8 +123,8 @@ void print_text(const Json& d) {
                    camera["position_m"][2].get<double>(), camera["forward"][0].get<double>(),
                    camera["forward"][1].get<double>(), camera["forward"][2].get<double>(),
                    camera["vertical_fov_degrees"].get<double>()));
-  line("rows", fmt::format("{} pixels in {} stored rows", d["rows"].get<std::int64_t>(),
-                           d["rows_stored"].get<int>()));
+  line("rows", fmt::format("{} {} in {} stored rows", d["rows"].get<std::int64_t>(),
+                           mesh ? "vertex terms" : "pixels", d["rows_stored"].get<int>()));
   const Json& columns = d["column_bytes"];
   line("columns", fmt::format("{} together; one is {} in the mean, {} to {}, median {}",
                               mebibytes(d["chunk_bytes"]), kibibytes(columns["mean"]),

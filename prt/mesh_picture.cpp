@@ -60,10 +60,17 @@ void check_camera(const Camera& camera) {
 struct Vertex {
   double x = 0, y = 0;    // on the grid, pixels; if not snapped: homogeneous
   double w = 0;           // depth, metres
+  double closeness = 0;   // 1 / w, if in front
   bool in_front = false;  // w >= near
   bool snapped = false;
-  double px() const { return snapped ? x : x / w; }
-  double py() const { return snapped ? y : y / w; }
+  double px() const { return snapped ? x : x * closeness; }
+  double py() const { return snapped ? y : y * closeness; }
+  Vec3 homogeneous() const { return snapped ? Vec3{x * w, y * w, w} : Vec3{x, y, w}; }
+};
+
+// Pixels, right and bottom past the end.
+struct Bounds {
+  int left = 0, right = 0, top = 0, bottom = 0;
 };
 
 // What is nearest at one place of a pixel so far.
@@ -77,9 +84,10 @@ struct Sample {
 struct Setup {
   double a[3], b[3], c[3], x0[3], y0[3];  // e = a (px - x0) + b (py - y0) + c
   bool owns_border[3];
-  double factor[3];  // lambda = factor e
+  double factor[3];                  // lambda = factor e
+  double at_place[3][kMostSamples];  // what each place of a pixel adds to the e of its corner
+  double most_at_place[3];
   double most_closeness;
-  int left, right, top, bottom;  // pixels, right and bottom past the end
 };
 
 }  // namespace
@@ -94,6 +102,7 @@ struct MeshPicture::State {
 
   void project(const Camera& camera);
   void sort_into_bands();
+  bool bounds(std::uint32_t triangle, Bounds& bounds) const;
   bool set_up(std::uint32_t triangle, Setup& setup) const;
   void draw_band(int band, std::vector<Sample>& samples);
   void look(const Camera& camera);
@@ -101,6 +110,7 @@ struct MeshPicture::State {
 
   std::shared_ptr<const TransportMesh> mesh_;
   int samples_;
+  const Place* place_;  // of the samples in a pixel
   double near_ = 0;
   int width_ = 0, height_ = 0;
   std::vector<Vertex> vertices_;
@@ -114,7 +124,9 @@ struct MeshPicture::State {
 };
 
 MeshPicture::State::State(std::shared_ptr<const TransportMesh> mesh, int samples)
-    : mesh_(std::move(mesh)), samples_(samples) {
+    : mesh_(std::move(mesh)),
+      samples_(samples),
+      place_(samples == 1 ? kMiddle.data() : kRotatedGrid.data()) {
   if (samples != 1 && samples != kMostSamples) {
     throw Error(ErrorKind::invalid_argument,
                 fmt::format("{} samples a pixel, expected 1 or 4", samples));
@@ -150,7 +162,8 @@ void MeshPicture::State::project(const Camera& camera) {
       v.in_front = v.w >= near_;
       v.snapped = false;
       if (!v.in_front) continue;
-      const double x = v.x / v.w, y = v.y / v.w;
+      v.closeness = 1 / v.w;
+      const double x = v.x * v.closeness, y = v.y * v.closeness;
       if (!(x >= -size && x <= 2 * size && y >= -size && y <= 2 * size)) continue;
       v.x = std::nearbyint(x * per_step) * step;
       v.y = std::nearbyint(y * per_step) * step;
@@ -159,38 +172,41 @@ void MeshPicture::State::project(const Camera& camera) {
   });
 }
 
-// False for triangles that no pixel can see.
+// Which pixels a triangle may touch; false: none.
+bool MeshPicture::State::bounds(std::uint32_t triangle, Bounds& bounds) const {
+  const auto& corners = mesh_->triangle[triangle];
+  const Vertex &a = vertices_[corners[0]], &b = vertices_[corners[1]], &c = vertices_[corners[2]];
+  const double width = width_, height = height_;
+  if (a.in_front && b.in_front && c.in_front) {
+    const double left = std::min({a.px(), b.px(), c.px()});
+    const double right = std::max({a.px(), b.px(), c.px()});
+    const double top = std::min({a.py(), b.py(), c.py()});
+    const double bottom = std::max({a.py(), b.py(), c.py()});
+    if (!(right >= 0 && left <= width && bottom >= 0 && top <= height)) return false;
+    bounds.left = static_cast<int>(std::max(left, 0.0));
+    bounds.right = std::min(width_, static_cast<int>(std::min(right, width)) + 1);
+    bounds.top = static_cast<int>(std::max(top, 0.0));
+    bounds.bottom = std::min(height_, static_cast<int>(std::min(bottom, height)) + 1);
+    return bounds.right > bounds.left && bounds.bottom > bounds.top;
+  }
+  // Reaches behind the camera: all of the picture, unless all corners are outside on one side.
+  const Vec3 h[3] = {a.homogeneous(), b.homogeneous(), c.homogeneous()};
+  const auto all = [&](auto outside) { return outside(h[0]) && outside(h[1]) && outside(h[2]); };
+  if ((!a.in_front && !b.in_front && !c.in_front) || all([](const Vec3& q) { return q.x < 0; }) ||
+      all([&](const Vec3& q) { return q.x > width * q.z; }) ||
+      all([](const Vec3& q) { return q.y < 0; }) ||
+      all([&](const Vec3& q) { return q.y > height * q.z; })) {
+    return false;
+  }
+  bounds = {0, width_, 0, height_};
+  return true;
+}
+
+// False for triangles seen edge-on.
 bool MeshPicture::State::set_up(std::uint32_t triangle, Setup& s) const {
   const auto& corners = mesh_->triangle[triangle];
   const Vertex* v[3];
   for (std::size_t i = 0; i < 3; ++i) v[i] = &vertices_[corners[i]];
-  const double width = width_, height = height_;
-
-  // Which pixels it may touch.
-  if (v[0]->in_front && v[1]->in_front && v[2]->in_front) {
-    const auto [left, right] = std::minmax({v[0]->px(), v[1]->px(), v[2]->px()});
-    const auto [top, bottom] = std::minmax({v[0]->py(), v[1]->py(), v[2]->py()});
-    if (!(right >= 0 && left <= width && bottom >= 0 && top <= height)) return false;
-    s.left = static_cast<int>(std::max(left, 0.0));
-    s.right = static_cast<int>(std::ceil(std::min(right, width)));
-    s.top = static_cast<int>(std::max(top, 0.0));
-    s.bottom = static_cast<int>(std::ceil(std::min(bottom, height)));
-    if (s.right <= s.left || s.bottom <= s.top) return false;
-  } else {
-    const auto all = [&](auto outside) {
-      return outside(*v[0]) && outside(*v[1]) && outside(*v[2]);
-    };
-    const auto hx = [](const Vertex& q) { return q.snapped ? q.x * q.w : q.x; };
-    const auto hy = [](const Vertex& q) { return q.snapped ? q.y * q.w : q.y; };
-    if (all([](const Vertex& q) { return !q.in_front; }) ||
-        all([&](const Vertex& q) { return hx(q) < 0; }) ||
-        all([&](const Vertex& q) { return hx(q) > width * q.w; }) ||
-        all([&](const Vertex& q) { return hy(q) < 0; }) ||
-        all([&](const Vertex& q) { return hy(q) > height * q.w; })) {
-      return false;
-    }
-    s.left = s.top = 0, s.right = width_, s.bottom = height_;
-  }
 
   // Edges. Both triangles of an edge compute it from the lower vertex to the higher, so that theirs
   // are each other's negative bit for bit.
@@ -203,11 +219,9 @@ bool MeshPicture::State::set_up(std::uint32_t triangle, Setup& s) const {
     if (p.snapped && q.snapped) {
       s.a[i] = sign * (p.y - q.y), s.b[i] = sign * (q.x - p.x), s.c[i] = 0;
       s.x0[i] = p.x, s.y0[i] = p.y;
-      s.factor[i] = snapped ? 1 / v[i]->w : p.w * q.w;
+      s.factor[i] = snapped ? v[i]->closeness : p.w * q.w;
     } else {
-      const Vec3 hp = p.snapped ? Vec3{p.x * p.w, p.y * p.w, p.w} : Vec3{p.x, p.y, p.w};
-      const Vec3 hq = q.snapped ? Vec3{q.x * q.w, q.y * q.w, q.w} : Vec3{q.x, q.y, q.w};
-      const Vec3 e = sign * cross(hp, hq);
+      const Vec3 e = sign * cross(p.homogeneous(), q.homogeneous());
       s.a[i] = e.x, s.b[i] = e.y, s.c[i] = e.z;
       s.x0[i] = s.y0[i] = 0;
       s.factor[i] = 1;
@@ -218,12 +232,7 @@ bool MeshPicture::State::set_up(std::uint32_t triangle, Setup& s) const {
     determinant =
         (v[1]->x - v[0]->x) * (v[2]->y - v[0]->y) - (v[2]->x - v[0]->x) * (v[1]->y - v[0]->y);
   } else {
-    Vec3 h[3];
-    for (std::size_t i = 0; i < 3; ++i) {
-      h[i] = v[i]->snapped ? Vec3{v[i]->x * v[i]->w, v[i]->y * v[i]->w, v[i]->w}
-                           : Vec3{v[i]->x, v[i]->y, v[i]->w};
-    }
-    determinant = dot(h[0], cross(h[1], h[2]));
+    determinant = dot(v[0]->homogeneous(), cross(v[1]->homogeneous(), v[2]->homogeneous()));
   }
   if (determinant == 0) return false;
   const double side = determinant > 0 ? 1 : -1, inverse = 1 / std::abs(determinant);
@@ -231,6 +240,11 @@ bool MeshPicture::State::set_up(std::uint32_t triangle, Setup& s) const {
     s.a[i] *= side, s.b[i] *= side, s.c[i] *= side;
     s.factor[i] *= inverse;
     s.owns_border[i] = s.a[i] > 0 || (s.a[i] == 0 && s.b[i] > 0);
+    s.most_at_place[i] = -std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < static_cast<std::size_t>(samples_); ++k) {
+      s.at_place[i][k] = s.a[i] * place_[k].x + s.b[i] * place_[k].y;
+      s.most_at_place[i] = std::max(s.most_at_place[i], s.at_place[i][k]);
+    }
   }
   s.most_closeness = snapped ? std::numeric_limits<double>::infinity() : 1 / near_;
   return true;
@@ -251,9 +265,9 @@ void MeshPicture::State::sort_into_bands() {
   parallel_for(slices, [&](int slice) {
     std::uint32_t* counts = band_counts_.data() + static_cast<std::size_t>(slice) * band_count;
     for_slice(slice, [&](std::uint32_t t) {
-      Setup s;
+      Bounds s;
       band_range_[t] = 0;
-      if (!set_up(t, s)) return;
+      if (!bounds(t, s)) return;
       const auto first = static_cast<std::uint32_t>(s.top / kBandRows);
       const auto end = static_cast<std::uint32_t>((s.bottom + kBandRows - 1) / kBandRows);
       band_range_[t] = first << 16 | end;
@@ -283,7 +297,6 @@ void MeshPicture::State::sort_into_bands() {
 void MeshPicture::State::draw_band(int band, std::vector<Sample>& samples) {
   const int first_row = band * kBandRows, end_row = std::min(height_, first_row + kBandRows);
   const auto n = static_cast<std::size_t>(samples_);
-  const Place* place = samples_ == 1 ? kMiddle.data() : kRotatedGrid.data();
   const auto row_samples = static_cast<std::size_t>(width_) * n;
   samples.assign(row_samples * static_cast<std::size_t>(end_row - first_row), Sample{});
 
@@ -291,16 +304,22 @@ void MeshPicture::State::draw_band(int band, std::vector<Sample>& samples) {
   for (std::uint32_t i = band_first_[at]; i < band_first_[at + 1]; ++i) {
     const std::uint32_t triangle = band_triangles_[i];
     Setup s;
-    if (!set_up(triangle, s)) continue;
-    for (int y = std::max(s.top, first_row); y < std::min(s.bottom, end_row); ++y) {
+    Bounds box;
+    if (!bounds(triangle, box) || !set_up(triangle, s)) continue;
+    for (int y = std::max(box.top, first_row); y < std::min(box.bottom, end_row); ++y) {
+      double row_e[3];
+      for (std::size_t j = 0; j < 3; ++j) row_e[j] = s.b[j] * (y - s.y0[j]) + s.c[j];
       Sample* row = samples.data() + static_cast<std::size_t>(y - first_row) * row_samples;
-      for (int x = s.left; x < s.right; ++x) {
+      for (int x = box.left; x < box.right; ++x) {
+        double corner[3];
+        for (std::size_t j = 0; j < 3; ++j) corner[j] = s.a[j] * (x - s.x0[j]) + row_e[j];
+        if (corner[0] + s.most_at_place[0] < 0 || corner[1] + s.most_at_place[1] < 0 ||
+            corner[2] + s.most_at_place[2] < 0) {
+          continue;
+        }
         for (std::size_t k = 0; k < n; ++k) {
-          const double px = x + place[k].x, py = y + place[k].y;
           double e[3];
-          for (std::size_t j = 0; j < 3; ++j) {
-            e[j] = s.a[j] * (px - s.x0[j]) + (s.b[j] * (py - s.y0[j]) + s.c[j]);
-          }
+          for (std::size_t j = 0; j < 3; ++j) e[j] = corner[j] + s.at_place[j][k];
           if (e[0] < 0 || e[1] < 0 || e[2] < 0) continue;
           if ((e[0] == 0 && !s.owns_border[0]) || (e[1] == 0 && !s.owns_border[1]) ||
               (e[2] == 0 && !s.owns_border[2])) {

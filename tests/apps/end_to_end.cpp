@@ -278,6 +278,55 @@ TEST_F(EndToEnd, InfoSaysWhatWasAskedFor) {
   }
 }
 
+TEST_F(EndToEnd, AMeshIsRelitFromAnywhere) {
+  make_transport({"--vertices", "--max-vertices", "3000", "--ground", "off"});
+  const Json info = Json::parse(run({"info", "table.hlt", "--json"}));
+  EXPECT_EQ(info.at("kind"), "mesh");
+  EXPECT_GT(info.at("vertices"), 100);  // of 8 in the file
+  EXPECT_LE(info.at("vertices"), 3000);
+  EXPECT_EQ(info.at("rows"), info.at("vertices"));
+  EXPECT_GT(info.at("triangles"), 4);
+  EXPECT_NE(run({"info", "table.hlt"}).find("triangles"), std::string::npos);
+
+  // The fixed view of the same camera shows the same, to interpolation and both compressions.
+  const std::vector<std::string> still{"relight", "table.hlt", "--env",    "room.exr",  "--motion",
+                                       "still",   "--frames",  "1",        "--formats", "exr",
+                                       "-o",      "mesh",      "--method", "reference"};
+  run(still);
+  fs::rename(path("table.hlt"), path("mesh.hlt"));
+  make_transport({"--ground", "off"});
+  std::vector<std::string> of_image = still;
+  of_image[11] = "image";
+  run(of_image);
+  const Image mesh = load_image(path("mesh") / "frame_0000.exr");
+  const Image image = load_image(path("image") / "frame_0000.exr");
+  EXPECT_LT(compare_images(mesh, image).relative_rmse, 0.1);
+
+  // The camera goes half round while the light rests: a point-symmetric scene looks the same under
+  // light that is the same all round.
+  save_image(path("even.exr"), fixtures::constant_environment({1, 1, 1}));
+  run({"relight",   "mesh.hlt", "--env", "even.exr", "--motion",  "still",    "--orbit",
+       "180",       "--stop",   "2",     "--frames", "3",         "--size",   "50x40",
+       "--formats", "exr",      "-o",    "round",    "--metrics", "round.csv"});
+  const Image first = load_image(path("round") / "frame_0000.exr");
+  const Image last = load_image(path("round") / "frame_0002.exr");
+  EXPECT_EQ(first.width, 50);
+  EXPECT_EQ(first.height, 40);
+  EXPECT_LT(compare_images(first, last).relative_rmse, 0.05);
+  const Table table = read_table(path("round.csv"));
+  EXPECT_EQ(table.rows.at(2).at("updates"), "0");
+
+  // Neither is for a fixed view.
+  for (const std::vector<std::string>& more :
+       {std::vector<std::string>{"--orbit", "10"}, std::vector<std::string>{"--size", "8x8"}}) {
+    std::vector<std::string> words = of_image;
+    words.insert(words.end(), more.begin(), more.end());
+    const ProgramResult refused = fixtures::run_program(words, path("."));
+    EXPECT_EQ(refused.code, 2);
+    EXPECT_NE(refused.err.find(more[0]), std::string::npos) << refused.err;
+  }
+}
+
 TEST_F(EndToEnd, AnInterruptedPrecomputeIsResumedToTheSameFile) {
   fixtures::write_table_scene(path("table.obj"));
   // Enough rays for a signal to come in time.
