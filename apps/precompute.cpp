@@ -15,6 +15,7 @@
 #include "apps/verbs.h"
 #include "core/error.h"
 #include "precompute/default_stage.h"
+#include "precompute/effects.h"
 #include "precompute/precompute_mesh.h"
 #include "precompute/scene_import.h"
 
@@ -141,6 +142,22 @@ Verb add_precompute(CLI::App& verb) {
       ->group("Accuracy");
   add_choice<int>(verb, "--pixel-samples", c.options.trace.pixel_samples,
                   {{"1", 1}, {"4", 4}, {"16", 16}}, "places looked at in a pixel, against jaggies")
+      ->group("Accuracy");
+  verb.add_option_function<std::string>(
+          "--effects",
+          [&c](const std::string& text) { c.options.trace.effects = parse_effects(text); },
+          "all, none, or a list of shadows, interreflection[=BOUNCES], gloss, specular, caustics, "
+          "color")
+      ->type_name("LIST")
+      ->group("Light");
+  add_power_of_two(verb, "--indirect-face", c.options.trace.indirect_face, 4, 256,
+                   "the same for light reflected between surfaces, which needs less")
+      ->group("Accuracy");
+  add_number(verb, "--noise", c.options.trace.noise, 1e-6, 1,
+             "relative RMSE that interreflection's paths may leave in a tile's picture")
+      ->group("Accuracy");
+  add_integer(verb, "--paths", c.options.trace.paths, 1, 1 << 20,
+              "most paths a tile of 64 rows, whatever the noise")
       ->group("Accuracy");
   add_number(verb, "--error", c.options.error, 0, 0.5,
              "relative RMSE of the picture that compression may cost; 0 keeps all")

@@ -45,7 +45,8 @@ void add_options(ContentHash& hash, const TraceOptions& options) {
   const Effects& e = options.effects;
   hash.add(e.shadows), hash.add(e.bounces), hash.add(e.gloss), hash.add(e.specular);
   hash.add(e.caustics), hash.add(e.color);
-  hash.add(options.noise), hash.add(options.paths), hash.add(options.seed);
+  hash.add(options.indirect_face), hash.add(options.noise), hash.add(options.paths),
+      hash.add(options.seed);
 }
 
 void add_options(ContentHash& hash, const RunOptions& options) { hash.add(options.error); }

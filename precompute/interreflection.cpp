@@ -18,9 +18,8 @@ namespace {
 
 constexpr std::size_t kRows = kTileRows;
 constexpr std::size_t kOut = 3 * kRows;  // channel * kRows + row
-constexpr std::size_t kPhases = SparseDirections::kPhases;
-constexpr int kSubBatches = 4;   // of a batch; their spread is the noise
-constexpr int kFollowOneIn = 4;  // of a vertex' directions that mirrors or glass block
+constexpr int kSubBatches = 4;           // of a batch; their spread is the noise
+constexpr int kFollowOneIn = 4;          // of a vertex' directions that mirrors or glass block
 constexpr std::int32_t kShared = -1;
 
 enum Part : unsigned { kDiffuse = 1, kLobe = 2, kDelta = 4, kAllParts = 7 };
@@ -104,7 +103,8 @@ struct Interreflection::Scratch {
   };
   // Light that left in a single direction.
   struct Deposit {
-    std::int32_t path = 0, slot = 0;  // phase * slots + slot
+    std::int32_t path = 0;
+    std::size_t texel = 0;
     RgbD tint;
   };
   struct Path {
@@ -118,8 +118,9 @@ struct Interreflection::Scratch {
   std::vector<float> values;  // [column][slot]
   std::vector<Deposit> deposits;
   std::vector<Path> paths;
-  std::vector<float> bases;  // [shared path][kOut]
-  std::vector<float> sums;   // [phase][kOut][slot]
+  std::vector<float> bases;      // [shared path][kOut]
+  std::vector<float> sums;       // [phase][kOut][slot]
+  std::vector<float> deposited;  // [kOut][texel]; empty until there is any
   std::vector<float> weights;
   std::vector<const float*> pointers;
   std::vector<ReceiverPacket> packets;
@@ -173,7 +174,7 @@ class Interreflection::Batch {
   void apply() {
     const std::size_t slots = o_.directions_.slots();
     // Shared columns, a product a phase.
-    for (std::size_t phase = 0; phase < kPhases; ++phase) {
+    for (std::size_t phase = 0; phase < o_.phases(); ++phase) {
       s_.pointers.clear();
       s_.weights.clear();
       for (std::size_t k = 0; k < s_.columns.size(); ++k) {
@@ -203,22 +204,24 @@ class Interreflection::Batch {
         for (std::size_t j = 0; j < slots; ++j) sum[j] += w * values[j];
       }
     }
+    if (s_.deposits.empty()) return;
+    const auto texels = static_cast<std::size_t>(o_.layout_.size());
+    if (s_.deposited.empty()) s_.deposited.assign(kOut * texels, 0.0f);
     for (const Scratch::Deposit& d : s_.deposits) {
       const Scratch::Path& path = s_.paths[static_cast<std::size_t>(d.path)];
-      const std::size_t phase = static_cast<std::size_t>(d.slot) / slots;
-      float* sum = s_.sums.data() + phase * kOut * slots + static_cast<std::size_t>(d.slot) % slots;
+      float* sum = s_.deposited.data() + d.texel;
       const double tint[3] = {d.tint.r, d.tint.g, d.tint.b};
       if (path.row != kShared) {
         const double own[3] = {path.own.r, path.own.g, path.own.b};
         for (std::size_t c = 0; c < 3; ++c) {
-          sum[(c * kRows + static_cast<std::size_t>(path.row)) * slots] +=
+          sum[(c * kRows + static_cast<std::size_t>(path.row)) * texels] +=
               static_cast<float>(own[c] * tint[c]);
         }
         continue;
       }
       const float* base = s_.bases.data() + path.base;
       for (std::size_t m = 0; m < kOut; ++m) {
-        sum[m * slots] += base[m] * static_cast<float>(tint[m / kRows]);
+        sum[m * texels] += base[m] * static_cast<float>(tint[m / kRows]);
       }
     }
   }
@@ -277,7 +280,7 @@ class Interreflection::Batch {
     const Vec3 w = cosine_direction(r.bsdf.normal, u.value[1], u.value[2]);
     if (!(dot(w, r.bsdf.geometric_normal) > 0)) return;
     PathRandom random(mix_bits(o_.seed_ + 1, i));
-    phase_ = static_cast<int>(u.value[3] * kPhases);
+    phase_ = static_cast<int>(u.value[3] * static_cast<double>(o_.phases()));
     ++counts_.bounce;
     const auto hit = surface_hit(o_.scene_, o_.visibility_, origin(r), w);
     if (!hit) return;
@@ -317,7 +320,7 @@ class Interreflection::Batch {
     const auto sample = r.bsdf.sample_lobe(u.value[1], u.value[2]);
     if (!sample || !(dot(sample->direction, r.bsdf.geometric_normal) > 0)) return;
     PathRandom random(mix_bits(o_.seed_ + 2, i));
-    phase_ = static_cast<int>(u.value[3] * kPhases);
+    phase_ = static_cast<int>(u.value[3] * static_cast<double>(o_.phases()));
     ++counts_.bounce;
     const auto hit = surface_hit(o_.scene_, o_.visibility_, origin(r), sample->direction);
     if (!hit) return;
@@ -491,7 +494,7 @@ class Interreflection::Batch {
 
   void deposit(std::int32_t path, const Vec3& direction, const RgbD& tint) {
     const std::size_t texel = texel_of(direction, o_.layout_.face_size());
-    s_.deposits.push_back({path, o_.slot_of_[texel], tint});
+    s_.deposits.push_back({path, texel, tint});
     Scratch::Path& p = s_.paths[static_cast<std::size_t>(path)];
     for (std::size_t l = 0; l < o_.lights_; ++l) {
       p.light[l] +=
@@ -504,12 +507,13 @@ class Interreflection::Batch {
   void gather(std::int32_t path, const SurfaceHit& y, const Bsdf& b, bool diffuse, bool lobe,
               const RgbD& out, const RgbD& tint, PathRandom& random) {
     const std::size_t slots = o_.directions_.slots();
-    const int phase = phase_ >= 0 ? phase_ : static_cast<int>(random.next() * kPhases);
+    const int phase =
+        phase_ >= 0 ? phase_ : static_cast<int>(random.next() * static_cast<double>(o_.phases()));
     phase_ = -1;
-    const int sample = static_cast<int>(random.next() * o_.directions_.samples());
+    const int place = static_cast<int>(random.next() * o_.directions_.places());
     const std::uint64_t key = mix_bits(
-        o_.seed_ + 3, static_cast<std::uint64_t>(path) * 64 + static_cast<std::uint64_t>(sample));
-    const SparseDirections::Packet* packets = o_.directions_.packets(phase, sample);
+        o_.seed_ + 3, static_cast<std::uint64_t>(path) * 64 + static_cast<std::uint64_t>(place));
+    const SparseDirections::Packet* packets = o_.directions_.packets(phase, place);
     const Vec3 from = y.position + Visibility::kSurfaceOffset * y.geometric_normal;
     const std::array<float, 3> start{static_cast<float>(from.x), static_cast<float>(from.y),
                                      static_cast<float>(from.z)};
@@ -625,36 +629,26 @@ class Interreflection::Batch {
 
 Interreflection::Interreflection(const Scene& scene, const Visibility& visibility,
                                  const DirectionTable& table, const Effects& effects,
-                                 std::uint64_t seed)
+                                 int resolution, std::uint64_t seed)
     : scene_(scene),
       visibility_(visibility),
       effects_(effects),
       seed_(seed),
       layout_(table.n),
-      directions_(table),
-      narrow_(4.0 / table.n) {
+      directions_(table, resolution),
+      narrow_(4.0 / resolution) {
   const std::size_t slots = directions_.slots();
   const auto texels = static_cast<std::size_t>(layout_.size());
-  slot_of_.assign(texels, 0);
-  for (std::size_t phase = 0; phase < kPhases; ++phase) {
-    const std::int32_t* texel = directions_.texels(static_cast<int>(phase));
-    for (std::size_t slot = 0; slot < slots; ++slot) {
-      if (texel[slot] >= 0) {
-        slot_of_[static_cast<std::size_t>(texel[slot])] =
-            static_cast<std::int32_t>(phase * slots + slot);
-      }
-    }
-  }
   const auto& lightings = prior_lightings(layout_);
   lights_ = lightings.size();
-  light_.assign(kPhases * lights_ * slots, 0.0f);
+  light_.assign(phases() * lights_ * slots, 0.0f);
   light_texels_.resize(lights_ * texels);
   for (std::size_t l = 0; l < lights_; ++l) {
     const std::span<float> of = std::span(light_texels_).subspan(l * texels, texels);
     haar_inverse(layout_, lightings[l], of);
     for (std::size_t k = 0; k < texels; ++k) {
-      const auto at = static_cast<std::size_t>(slot_of_[k]);
-      light_[(at / slots * lights_ + l) * slots + at % slots] = of[k];
+      const auto at = static_cast<std::size_t>(directions_.square()[k]);
+      light_[(at / slots * lights_ + l) * slots + at % slots] += of[k] * directions_.share()[k];
     }
   }
 }
@@ -682,7 +676,8 @@ void Interreflection::add(const TileReceivers& tile, const PathBudget& budget, S
     }
   }
 
-  s.sums.assign(kPhases * kOut * slots, 0.0f);
+  s.sums.assign(phases() * kOut * slots, 0.0f);
+  s.deposited.clear();
   s.sub_sum.assign(lights_ * kOut, 0.0);
   s.sum.assign(lights_ * kOut, 0.0);
   s.square.assign(lights_ * kOut, 0.0);
@@ -712,13 +707,13 @@ void Interreflection::add(const TileReceivers& tile, const PathBudget& budget, S
   const float share = 1.0f / static_cast<float>(done);
   for (std::size_t m = 0; m < kOut; ++m) {
     float* row = rows.data() + m * texels;
-    for (std::size_t phase = 0; phase < kPhases; ++phase) {
-      const std::int32_t* texel = directions_.texels(static_cast<int>(phase));
-      const float* sum = s.sums.data() + (phase * kOut + m) * slots;
-      for (std::size_t slot = 0; slot < slots; ++slot) {
-        if (texel[slot] >= 0) row[texel[slot]] += share * sum[slot];
-      }
+    for (std::size_t k = 0; k < texels; ++k) {
+      const auto at = static_cast<std::size_t>(directions_.square()[k]);
+      row[k] +=
+          share * directions_.share()[k] * s.sums[(at / slots * kOut + m) * slots + at % slots];
     }
+    if (s.deposited.empty()) continue;
+    for (std::size_t k = 0; k < texels; ++k) row[k] += share * s.deposited[m * texels + k];
   }
 }
 

@@ -10,8 +10,11 @@
 // each receiver profits from the paths of all (Veach 1997, section 9.2; Bekaert and others 2002 for
 // the sharing). Lobes and single directions on the way serve the receiver they started from only.
 //
-// Vertices look into one sixteenth of the texels each (precompute/sparse_directions.h); so that a
-// tile's sum over paths is one small matrix product a phase: rows x paths times paths x texels.
+// Light that has been reflected depends on its first direction more smoothly than direct light: it
+// is a mean over all the places where it may have met the scene. So vertices look at the sky in
+// squares of texels, and where those are still many, into a part of them each
+// (precompute/sparse_directions.h). A tile's sum over paths is then one small matrix product: rows
+// x paths times paths x squares.
 
 #pragma once
 
@@ -50,9 +53,10 @@ inline constexpr int kPathBatch = 512;
 
 class Interreflection {
  public:
-  /// Keeps references to scene, visibility and table.
+  /// `resolution`: squares along an edge of a cube face, a power of two, at most table.n. Keeps
+  /// references to scene and visibility.
   Interreflection(const Scene& scene, const Visibility& visibility, const DirectionTable& table,
-                  const Effects& effects, std::uint64_t seed);
+                  const Effects& effects, int resolution, std::uint64_t seed);
   ~Interreflection();
 
   struct Scratch;
@@ -67,14 +71,15 @@ class Interreflection {
  private:
   class Batch;
 
+  std::size_t phases() const { return static_cast<std::size_t>(directions_.phases()); }
+
   const Scene& scene_;
   const Visibility& visibility_;
   Effects effects_;
   std::uint64_t seed_;
   HaarLayout layout_;
   SparseDirections directions_;
-  double narrow_;                      // lobes below this half width are sampled, radians
-  std::vector<std::int32_t> slot_of_;  // per texel: phase * slots + slot
+  double narrow_;  // lobes below this half width are sampled, radians
   std::size_t lights_ = 0;
   std::vector<float> light_;         // [phase][light][slot]
   std::vector<float> light_texels_;  // [light][texel]

@@ -25,6 +25,7 @@ std::string meta_json(const Scene& scene, const PrecomputeOptions& options) {
                               {"adaptive", t.adaptive},
                               {"pixel_samples", t.pixel_samples},
                               {"error", options.error},
+                              {"indirect_face", t.indirect_face},
                               {"noise", t.noise},
                               {"paths", t.paths},
                               {"seed", t.seed}}},

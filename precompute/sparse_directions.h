@@ -1,4 +1,4 @@
-// A sixteenth of all directions at a time, for points whose light is only needed on average.
+// A part of the sky at a time, for points whose light is only needed on average.
 
 #pragma once
 
@@ -9,40 +9,42 @@
 
 namespace haarlight {
 
-/// The texels of a cube map dealt out to 16 phases, one of each 4x4 square. A point that looks into
-/// one phase only, chosen evenly at random, and counts what it finds 16-fold, is right on average
-/// for every texel; so is looking through one sample of a texel counted for all of them.
+/// The sky in squares of texels, dealt out to phases. A point that looks into one phase only,
+/// chosen evenly at random, through a random place of each of its squares, and counts what it finds
+/// once for every phase, is right on average for the mean of every square.
 class SparseDirections {
  public:
-  static constexpr int kPhases = 16;
+  /// Directions of `table` in squares such that a face has `resolution` squares along an edge: a
+  /// power of two, at most table.n. Phases are as many as leave 16 by 16 squares of a face in one.
+  SparseDirections(const DirectionTable& table, int resolution);
 
-  explicit SparseDirections(const DirectionTable& table);
-
-  /// Eight directions; lanes of slots [8 p, 8 p + 8) of packet p.
+  /// Eight directions; slots [8 p, 8 p + 8) are the lanes of packet p.
   struct alignas(32) Packet {
     float x[8], y[8], z[8];  ///< unit
-    float weight[8];         ///< sr: the texel's solid angle times kPhases; 0: no direction
+    float weight[8];         ///< sr: the square's solid angle times phases(); 0: no direction
   };
 
-  int samples() const { return samples_; }
-  /// Slots of a phase: 6 (n / 4)^2, rounded up to packets of eight.
+  int phases() const { return phases_; }
+  /// Places in a square; the packets of one place hold one place of each square.
+  int places() const { return places_; }
+  /// Slots of a phase, a square each, rounded up to packets of eight.
   std::size_t slots() const { return slots_; }
-  /// Packets of a phase through sample `s` of its texels: slots() / 8 of them.
-  const Packet* packets(int phase, int s) const {
-    return packets_.data() + (static_cast<std::size_t>(phase) * static_cast<std::size_t>(samples_) +
-                              static_cast<std::size_t>(s)) *
+  /// slots() / 8 packets.
+  const Packet* packets(int phase, int place) const {
+    return packets_.data() + (static_cast<std::size_t>(phase) * static_cast<std::size_t>(places_) +
+                              static_cast<std::size_t>(place)) *
                                  (slots_ / 8);
   }
-  /// Which texel a slot stands for, or -1 for padding: slots() entries.
-  const std::int32_t* texels(int phase) const {
-    return texels_.data() + static_cast<std::size_t>(phase) * slots_;
-  }
+  /// Per texel: phase * slots() + slot of its square, and its share of the square's solid angle.
+  const std::vector<std::int32_t>& square() const { return square_; }
+  const std::vector<float>& share() const { return share_; }
 
  private:
-  int samples_;
+  int phases_, places_;
   std::size_t slots_;
   std::vector<Packet> packets_;
-  std::vector<std::int32_t> texels_;
+  std::vector<std::int32_t> square_;
+  std::vector<float> share_;
 };
 
 }  // namespace haarlight

@@ -57,6 +57,10 @@ void check(const TraceOptions& options) {
            "0 without shadows: light that passes through "
            "surfaces is not reflected by them");
   }
+  if (options.indirect_face < 4 ||
+      !std::has_single_bit(static_cast<unsigned>(options.indirect_face))) {
+    refuse("indirect face size", options.indirect_face, "a power of two from 4");
+  }
   if (!(options.noise > 0) || !(options.noise <= 1)) {
     refuse("noise", options.noise, "above 0 and at most 1");
   }
@@ -72,7 +76,8 @@ TileTracer::TileTracer(const Scene& scene, const Visibility& visibility,
       table_(options.face_size, options.spp),
       points_(visibility, table_, options.adaptive, options.effects.shadows) {
   if (options.effects.bounces > 0) {
-    paths_.emplace(scene, visibility, table_, options.effects, options.seed);
+    paths_.emplace(scene, visibility, table_, options.effects,
+                   std::min(options.indirect_face, options.face_size), options.seed);
   }
 }
 

@@ -1,4 +1,4 @@
-// A sixteenth of all directions at a time.
+// A part of the sky at a time.
 
 #include "precompute/sparse_directions.h"
 
@@ -11,43 +11,50 @@
 namespace haarlight {
 namespace {
 
-// Phases share the texels out between them, one of each 4x4 square, and counted 16-fold each covers
-// the sphere on average.
-TEST(SparseDirections, PhasesAreAPartition) {
-  for (const int n : {4, 8, 64}) {
-    const DirectionTable table(n, 2);
-    const SparseDirections sparse(table);
+// Squares of all phases are a partition of the texels; counted once for every phase they cover the
+// sphere; and each direction lies in its square.
+TEST(SparseDirections, SquaresAreAPartition) {
+  struct Case {
+    int n, resolution, phases;
+  };
+  for (const Case& c : {Case{4, 4, 1}, Case{8, 4, 1}, Case{32, 32, 4}, Case{64, 16, 1},
+                        Case{64, 64, 16}, Case{16, 16, 1}}) {
+    const DirectionTable table(c.n, 2);
+    const SparseDirections sparse(table, c.resolution);
+    EXPECT_EQ(sparse.phases(), c.phases);
     EXPECT_EQ(sparse.slots() % 8, 0u);
-    std::vector<int> met(table.texels(), 0);
-    double all = 0;
-    for (int phase = 0; phase < SparseDirections::kPhases; ++phase) {
-      std::vector<int> squares(table.texels(), 0);
-      for (std::size_t slot = 0; slot < sparse.slots(); ++slot) {
-        const std::int32_t texel = sparse.texels(phase)[slot];
-        for (int s = 0; s < 2; ++s) {
-          const auto& p = sparse.packets(phase, s)[slot / 8];
-          const auto lane = slot % 8;
-          EXPECT_NEAR(p.x[lane] * p.x[lane] + p.y[lane] * p.y[lane] + p.z[lane] * p.z[lane], 1,
-                      1e-6);
-          if (texel < 0) {
-            EXPECT_EQ(p.weight[lane], 0.0f);
-            continue;
-          }
-          const Vec3 d{static_cast<double>(p.x[lane]), static_cast<double>(p.y[lane]),
-                       static_cast<double>(p.z[lane])};
-          EXPECT_EQ(texel_of(d, n), static_cast<std::size_t>(texel));
-          all += static_cast<double>(p.weight[lane]) / 2;
-        }
-        if (texel < 0) continue;
-        ++met[static_cast<std::size_t>(texel)];
-        const int x = texel % n, y = texel / n % n, face = texel / (n * n);
-        ++squares[cube_index(face, x / 4, y / 4, n)];
-      }
-      for (const int count : squares) EXPECT_LE(count, 1);
+    const auto width = static_cast<std::size_t>(c.n / c.resolution);
+    std::vector<int> texels_of(static_cast<std::size_t>(c.phases) * sparse.slots(), 0);
+    std::vector<double> share_of(texels_of.size(), 0.0);
+    for (std::size_t k = 0; k < table.texels(); ++k) {
+      ++texels_of[static_cast<std::size_t>(sparse.square()[k])];
+      share_of[static_cast<std::size_t>(sparse.square()[k])] +=
+          static_cast<double>(sparse.share()[k]);
     }
-    for (const int count : met) EXPECT_EQ(count, 1);
-    // 16 phases, each 16-fold: 16 spheres; weights are floats, sums of 12 n^2 of them.
-    EXPECT_NEAR(all, 16 * 4 * kPi, 1e-3);
+    double sphere = 0;
+    for (std::size_t at = 0; at < texels_of.size(); ++at) {
+      const auto phase = static_cast<int>(at / sparse.slots());
+      const std::size_t slot = at % sparse.slots();
+      const bool padding = texels_of[at] == 0;
+      if (!padding) {
+        EXPECT_EQ(texels_of[at], static_cast<int>(width * width));
+        EXPECT_NEAR(share_of[at], 1, 1e-6);
+      }
+      for (int place = 0; place < sparse.places(); ++place) {
+        const auto& p = sparse.packets(phase, place)[slot / 8];
+        const std::size_t lane = slot % 8;
+        const Vec3 d{static_cast<double>(p.x[lane]), static_cast<double>(p.y[lane]),
+                     static_cast<double>(p.z[lane])};
+        EXPECT_NEAR(length(d), 1, 1e-6);
+        if (padding) {
+          EXPECT_EQ(p.weight[lane], 0.0f);
+          continue;
+        }
+        EXPECT_EQ(static_cast<std::size_t>(sparse.square()[texel_of(d, c.n)]), at);
+        if (place == 0) sphere += static_cast<double>(p.weight[lane]) / c.phases;
+      }
+    }
+    EXPECT_NEAR(sphere, 4 * kPi, 1e-4);  // at most 24,576 floats of 4 pi together
   }
 }
 
