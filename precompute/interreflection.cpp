@@ -277,10 +277,10 @@ class Interreflection::Batch {
     const EvenPoint u = even_point(i, shift_);
     const std::size_t l = s_.diffuse.choose(u.value[0]);
     const Receiver& r = tile_.receivers[l];
-    const Vec3 w = cosine_direction(r.bsdf.normal, u.value[1], u.value[2]);
+    const Vec3 w = cosine_direction(r.bsdf.normal, u.value[2], u.value[3]);
     if (!(dot(w, r.bsdf.geometric_normal) > 0)) return;
     PathRandom random(mix_bits(o_.seed_ + 1, i));
-    phase_ = static_cast<int>(u.value[3] * static_cast<double>(o_.phases()));
+    phase_ = static_cast<int>(u.value[1] * static_cast<double>(o_.phases()));
     ++counts_.bounce;
     const auto hit = surface_hit(o_.scene_, o_.visibility_, origin(r), w);
     if (!hit) return;
@@ -317,10 +317,10 @@ class Interreflection::Batch {
     const EvenPoint u = even_point(i, lobe_shift_);
     const std::size_t l = s_.lobe.choose(u.value[0]);
     const Receiver& r = tile_.receivers[l];
-    const auto sample = r.bsdf.sample_lobe(u.value[1], u.value[2]);
+    const auto sample = r.bsdf.sample_lobe(u.value[2], u.value[3]);
     if (!sample || !(dot(sample->direction, r.bsdf.geometric_normal) > 0)) return;
     PathRandom random(mix_bits(o_.seed_ + 2, i));
-    phase_ = static_cast<int>(u.value[3] * static_cast<double>(o_.phases()));
+    phase_ = static_cast<int>(u.value[1] * static_cast<double>(o_.phases()));
     ++counts_.bounce;
     const auto hit = surface_hit(o_.scene_, o_.visibility_, origin(r), sample->direction);
     if (!hit) return;

@@ -207,7 +207,7 @@ void PointTracer::refine(const ShadingPoint& point, const GlossyLobe* lobe, cons
 // A lobe between the samples of texels: even draws from it, each a ray of its own.
 void PointTracer::draw_lobe(const ShadingPoint& point, std::vector<Deposit>& deposits,
                             RayCounts& counts) const {
-  constexpr double kShift[4] = {0.5, 0.5, 0, 0};
+  constexpr double kShift[4] = {0, 0, 0.5, 0.5};
   const Bsdf& b = point.bsdf;
   alignas(32) float x[8] = {}, y[8] = {}, z[8] = {};
   Deposit part[8];
@@ -226,7 +226,7 @@ void PointTracer::draw_lobe(const ShadingPoint& point, std::vector<Deposit>& dep
   };
   for (int i = 0; i < kLobeDraws; ++i) {
     const EvenPoint u = even_point(static_cast<std::uint64_t>(i), kShift);
-    const auto draw = b.sample_lobe(u.value[0], u.value[1]);
+    const auto draw = b.sample_lobe(u.value[2], u.value[3]);
     if (!draw || !(dot(draw->direction, b.geometric_normal) > 0)) continue;
     const Bsdf::LobeValues v = b.lobe_values(draw->direction);
     part[waiting] = {
@@ -386,10 +386,10 @@ void PointTracer::trace_caustics(const Scene& scene, const ShadingPoint& point,
   }
   flush();
   if (!lobe || !lobe->is_narrow()) return;
-  constexpr double kShift[4] = {0.5, 0.5, 0, 0};
+  constexpr double kShift[4] = {0, 0, 0.5, 0.5};
   for (int i = 0; i < kLobeDraws; ++i) {
     const EvenPoint u = even_point(static_cast<std::uint64_t>(i), kShift);
-    const auto draw = b.sample_lobe(u.value[0], u.value[1]);
+    const auto draw = b.sample_lobe(u.value[2], u.value[3]);
     if (!draw || !(dot(draw->direction, b.geometric_normal) > 0)) continue;
     const Bsdf::LobeValues v = b.lobe_values(draw->direction);
     wait(draw->direction,

@@ -29,19 +29,18 @@ class PathRandom {
   std::uint64_t key_, counter_ = 0;
 };
 
-/// Point `i` of the four-dimensional Kronecker sequence of the root of x^5 = x + 1, moved by
-/// `shift` (each [0, 1)): any run of it fills the cube evenly, and with a random shift each point
-/// by itself is uniform.
+/// Point `i` of a four-dimensional Kronecker sequence moved by `shift` (each [0, 1)): any run of it
+/// fills the cube evenly, its last two coordinates best (the steps of Roberts' R2 sequence; the
+/// others are roots), and with a random shift each point by itself is uniform.
 struct EvenPoint {
   double value[4];
 };
 inline EvenPoint even_point(std::uint64_t i, const double (&shift)[4]) {
-  constexpr double kRoot = 1.1673039782614187;
+  constexpr double kStep[4] = {0.41421356237309505, 0.73205080756887729, 0.75487766624669276,
+                               0.56984029099805327};
   EvenPoint p{};
-  double step = 1;
   for (int d = 0; d < 4; ++d) {
-    step /= kRoot;
-    const double x = shift[d] + static_cast<double>(i) * step;
+    const double x = shift[d] + static_cast<double>(i) * kStep[d];
     p.value[d] = x - std::floor(x);
   }
   return p;

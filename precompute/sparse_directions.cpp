@@ -10,7 +10,7 @@
 namespace haarlight {
 namespace {
 
-constexpr int kSidePerPhase = 16;
+constexpr int kSidePerPhase = 8;
 constexpr int kMostPlaces = 16;
 
 // Even bits of a Morton code.

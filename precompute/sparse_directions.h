@@ -15,7 +15,7 @@ namespace haarlight {
 class SparseDirections {
  public:
   /// Directions of `table` in squares such that a face has `resolution` squares along an edge: a
-  /// power of two, at most table.n. Phases are as many as leave 16 by 16 squares of a face in one.
+  /// power of two, at most table.n. Phases are as many as leave 8 by 8 squares of a face in one.
   SparseDirections(const DirectionTable& table, int resolution);
 
   /// Eight directions; slots [8 p, 8 p + 8) are the lanes of packet p.

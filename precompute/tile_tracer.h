@@ -28,7 +28,7 @@ struct TraceOptions {
   bool adaptive = true;    ///< all directions only where visibility changes (see PointTracer)
   int pixel_samples = 4;   ///< 1, 4 or 16
   Effects effects;         ///< what is simulated; by default direct light of every kind
-  int indirect_face = 16;  ///< squares along an edge of a cube face in which the sky is seen by
+  int indirect_face = 32;  ///< squares along an edge of a cube face in which the sky is seen by
                            ///< light that is reflected between surfaces; a power of two, at least
                            ///< 4; no more than face_size are used
   double noise = 0.01;     ///< a tile's interreflection is traced until its picture is estimated to
