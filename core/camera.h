@@ -14,6 +14,8 @@ struct Camera {
   double vertical_fov = 0.7;      ///< radians, in (0, pi)
   int width = 512, height = 512;  ///< pixels
 
+  bool operator==(const Camera&) const = default;
+
   /// Unit direction through a place in the picture: (x, y) in pixels, the middle of the top left
   /// pixel is (0.5, 0.5), y down. Pixels are square.
   Vec3 direction(double x, double y) const {

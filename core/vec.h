@@ -39,6 +39,7 @@ struct Rotation {
   constexpr Vec3 operator*(const Vec3& v) const {
     return {dot(row[0], v), dot(row[1], v), dot(row[2], v)};
   }
+  bool operator==(const Rotation&) const = default;
   constexpr Rotation transposed() const {
     return {{Vec3{row[0].x, row[1].x, row[2].x}, Vec3{row[0].y, row[1].y, row[2].y},
              Vec3{row[0].z, row[1].z, row[2].z}}};

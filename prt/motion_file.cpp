@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
@@ -78,6 +79,51 @@ DiscLight disc_from(const json& value, const std::string& where) {
   return disc;
 }
 
+Rotation rotation_of(const std::array<double, 9>& m) {
+  Rotation rotation;
+  for (std::size_t i = 0; i < 3; ++i) rotation.row[i] = {m[3 * i], m[3 * i + 1], m[3 * i + 2]};
+  return rotation;
+}
+
+json rotation_json(const Rotation& rotation) {
+  json m = json::array();
+  for (const Vec3& row : rotation.row) {
+    for (const double x : {row.x, row.y, row.z}) m.push_back(x);
+  }
+  return m;
+}
+
+Camera camera_from(const json& value, const std::string& where) {
+  Camera camera;
+  if (!value.is_object()) refuse(where, "is " + value.dump() + ", expected an object");
+  for (const auto& [key, entry] : value.items()) {
+    const std::string at = where + ", " + key;
+    if (key == "position") {
+      const auto p = numbers<3>(entry, at);
+      camera.position = {p[0], p[1], p[2]};
+    } else if (key == "orientation") {
+      camera.orientation = rotation_of(numbers<9>(entry, at));
+    } else if (key == "vertical_fov") {
+      camera.vertical_fov = number(entry, at);
+    } else if (key == "width") {
+      camera.width = integer(entry, at);
+    } else if (key == "height") {
+      camera.height = integer(entry, at);
+    } else {
+      refuse(at, "is no key of a camera");
+    }
+  }
+  return camera;
+}
+
+json camera_json(const Camera& camera) {
+  return {{"position", {camera.position.x, camera.position.y, camera.position.z}},
+          {"orientation", rotation_json(camera.orientation)},
+          {"vertical_fov", camera.vertical_fov},
+          {"width", camera.width},
+          {"height", camera.height}};
+}
+
 void read_key(const std::string& key, const json& value, const std::string& at,
               RecordedFrame& frame) {
   if (key == "from") {
@@ -90,9 +136,9 @@ void read_key(const std::string& key, const json& value, const std::string& at,
     frame.light.background = number(value, at);
   } else if (key == "rotation") {
     const auto m = numbers<9>(value, at);
-    for (std::size_t i = 0; i < 3; ++i) {
-      frame.light.rotation.row[i] = {m[3 * i], m[3 * i + 1], m[3 * i + 2]};
-    }
+    frame.light.rotation = rotation_of(m);
+  } else if (key == "camera") {
+    frame.camera = camera_from(value, at);
   } else if (key == "lights") {
     if (!value.is_array()) refuse(at, "is " + value.dump() + ", expected a list");
     frame.light.discs.clear();
@@ -137,12 +183,7 @@ json frame_json(const RecordedFrame& frame, const RecordedFrame& before) {
   if (now.to != old.to) out["to"] = now.to;
   if (now.blend != old.blend) out["blend"] = now.blend;
   if (now.background != old.background) out["background"] = now.background;
-  if (now.rotation.row != old.rotation.row) {
-    json& m = out["rotation"] = json::array();
-    for (const Vec3& row : now.rotation.row) {
-      for (const double x : {row.x, row.y, row.z}) m.push_back(x);
-    }
-  }
+  if (now.rotation != old.rotation) out["rotation"] = rotation_json(now.rotation);
   if (now.discs != old.discs) {
     json& lights = out["lights"] = json::array();
     for (const DiscLight& disc : now.discs) lights.push_back(light_json(disc));
@@ -150,6 +191,7 @@ json frame_json(const RecordedFrame& frame, const RecordedFrame& before) {
   if (frame.method != before.method) out["method"] = lighting_method_name(frame.method);
   if (frame.wavelets != before.wavelets) out["wavelets"] = frame.wavelets;
   if (frame.weight != before.weight) out["weight"] = wavelet_weight_name(frame.weight);
+  if (frame.camera && frame.camera != before.camera) out["camera"] = camera_json(*frame.camera);
   for (const auto& [start, name] : kStarts) {
     if (frame.start == start && start != FrameStart::advance) out["start"] = name;
   }

@@ -4,9 +4,11 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "core/camera.h"
 #include "prt/frame_relighter.h"
 #include "prt/light_rig.h"
 
@@ -19,6 +21,7 @@ struct RecordedFrame {
   int wavelets = 30;  ///< the budget that was used, also where it was given in milliseconds; >= 1
   WaveletWeight weight = WaveletWeight::area;
   FrameStart start = FrameStart::advance;
+  std::optional<Camera> camera;  ///< of a mesh; none: the file's
   bool operator==(const RecordedFrame&) const = default;
 };
 

@@ -87,6 +87,7 @@ void relight_recording(const Transport& transport, std::span<const Environment> 
     const RecordedFrame& frame = recording.frames[static_cast<std::size_t>(i)];
     const std::span<const Rgb> target = rig.coefficients(frame.light);
     relighter.set_options(options_of(frame), frame.weight);
+    if (frame.camera) relighter.set_camera(*frame.camera);
     hand_out(relighter, relighter.relight(target, frame.start, i), target, frames, frame_done);
   }
 }

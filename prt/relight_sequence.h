@@ -52,7 +52,8 @@ void relight_sequence(const Transport& transport, const Environment& from, const
                       const SequenceOptions& options, const FrameDone& frame_done);
 
 /// Replays a recording, frame by frame, with the numbers it had. `environments` are those it names,
-/// in its order. A mesh is drawn as the file has it. Throws Error{invalid_argument} when there are
+/// in its order. A mesh is drawn from
+/// where it was seen. Throws Error{invalid_argument} when there are
 /// not that many.
 void relight_recording(const Transport& transport, std::span<const Environment> environments,
                        const MotionRecording& recording, bool against_reference,

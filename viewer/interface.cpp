@@ -73,6 +73,7 @@ struct HelpLine {
 };
 constexpr HelpLine kHelp[] = {
     {"drag the picture", "turn the light"},
+    {"right, middle, wheel", "of a mesh: go round it, move it, go closer"},
     {"Space", "play, pause"},
     {".", "one frame"},
     {"0", "light and motion as at first"},
@@ -118,7 +119,8 @@ void Interface::mark(const char* name) {
 void Interface::note(const Notice& notice) {
   message_ = notice.text;
   message_failed_ = notice.failed;
-  message_age_ = 0;
+  message_since_ = std::chrono::steady_clock::now();
+  message_shown_ = true;
 }
 
 void Interface::open(const fs::path& file) {
@@ -144,10 +146,9 @@ void Interface::open_environment(const fs::path& file, double fade) {
   actions_.emplace_back(OpenEnvironment{file, fade});
 }
 
-// Drawn once more when its time is over; what is drawn rarely counts time in large steps.
-bool Interface::message_fading() const {
-  const double most = message_failed_ ? 3 * kMessageSeconds : kMessageSeconds;
-  return message_age_ < most;
+bool Interface::message_over() const {
+  const std::chrono::duration<double> age = std::chrono::steady_clock::now() - message_since_;
+  return message_shown_ && age.count() > (message_failed_ ? 3 : 1) * kMessageSeconds;
 }
 
 PaintOptions Interface::paint() const {
@@ -162,6 +163,12 @@ bool Interface::moving() const {
   return inertia_ && !dragging_light_ && std::abs(yaw_speed_) + std::abs(pitch_speed_) > 1e-3;
 }
 
+void Interface::reset_view() {
+  settings_.yaw = settings_.pitch = yaw_speed_ = pitch_speed_ = 0;
+  settings_.orbit = settings_.elevation = settings_.closer = settings_.right = settings_.up = 0;
+  actions_.emplace_back(Rewind{});
+}
+
 void Interface::cycle_compare() {
   compare_ = static_cast<CompareView>((static_cast<int>(compare_) + 1) % 3);
 }
@@ -174,8 +181,7 @@ void Interface::handle_keys(const ViewFrame& frame) {
     actions_.emplace_back(Step{});
   }
   if (pressed(GLFW_KEY_0)) {
-    settings_.yaw = settings_.pitch = yaw_speed_ = pitch_speed_ = 0;
-    actions_.emplace_back(Rewind{});
+    reset_view();
   }
   if (pressed(GLFW_KEY_R)) actions_.emplace_back(Restart{FrameStart::dark});
   if (pressed(GLFW_KEY_E)) actions_.emplace_back(Restart{FrameStart::exact});
@@ -217,6 +223,18 @@ void Interface::handle_keys(const ViewFrame& frame) {
     browser_.open("Open", {".hlt", ".exr", ".hdr"}, [this](const fs::path& file) { open(file); });
   }
   if (pressed(GLFW_KEY_Q, true)) quit_ = true;
+}
+
+// A mesh is drawn in the shape of what the panels leave, at no more pixels than are quickly filled.
+void Interface::fit_mesh(const ViewFrame& frame, float right, float bottom) {
+  settings_.width = settings_.height = 0;
+  if (frame.number == 0 || frame.scene->transport.kind() != TransportKind::mesh) return;
+  const float room = compare_ == CompareView::side ? 0.5f * right : right;
+  if (room < 1 || bottom < 1) return;
+  const float most = 720;
+  const float factor = std::min(1.0f, most / std::max(room, bottom));
+  settings_.width = std::max(1, static_cast<int>(std::lround(room * factor)));
+  settings_.height = std::max(1, static_cast<int>(std::lround(bottom * factor)));
 }
 
 // The largest place that keeps the picture's shape, in what the panels leave.
@@ -273,8 +291,39 @@ void Interface::handle_picture(const ViewFrame& frame, double seconds) {
   } else {
     yaw_speed_ = pitch_speed_ = 0;
   }
+  handle_view(frame, over(first_) || over(second_));
   settings_.yaw = std::remainder(settings_.yaw + yaw, 2 * kPi);
   settings_.pitch = std::clamp(settings_.pitch + pitch, -0.5 * kPi, 0.5 * kPi);
+}
+
+// Of a mesh: the right button, or the left with Shift, goes round it; the middle one moves it; the
+// wheel goes closer.
+void Interface::handle_view(const ViewFrame& frame, bool over_picture) {
+  if (frame.number == 0 || frame.scene->transport.kind() != TransportKind::mesh) return;
+  const ImGuiIO& io = ImGui::GetIO();
+  for (const int button : {0, 1, 2}) {
+    if (ImGui::IsMouseClicked(button) && !io.WantCaptureMouse && over_picture &&
+        (button > 0 || io.KeyShift)) {
+      view_button_ = button;
+      dragging_light_ = false;
+    }
+  }
+  if (view_button_ >= 0 && !io.MouseDown[view_button_]) view_button_ = -1;
+  if (view_button_ >= 0 && first_.height > 0) {
+    const auto dx = static_cast<double>(io.MouseDelta.x / first_.height);
+    const auto dy = static_cast<double>(io.MouseDelta.y / first_.height);
+    if (view_button_ == 2) {
+      settings_.right = std::clamp(settings_.right + dx, -100.0, 100.0);
+      settings_.up = std::clamp(settings_.up - dy, -100.0, 100.0);
+    } else {
+      settings_.orbit = std::remainder(settings_.orbit - kPi * dx, 2 * kPi);
+      settings_.elevation = std::clamp(settings_.elevation + kPi * dy, -kPi, kPi);
+    }
+  }
+  if (over_picture && !io.WantCaptureMouse && io.MouseWheel != 0) {
+    settings_.closer =
+        std::clamp(settings_.closer + 0.15 * static_cast<double>(io.MouseWheel), -6.0, 6.0);
+  }
 }
 
 void Interface::draw(const ViewFrame& frame, const WindowTimes& times, double seconds,
@@ -285,7 +334,7 @@ void Interface::draw(const ViewFrame& frame, const WindowTimes& times, double se
     if (!own_exposure) exposure_ev = frame.exact_exposure_ev;
   }
   if (new_frame && frame.number > 0) history_.add(frame);
-  message_age_ += seconds;
+  if (message_over()) message_shown_ = false;
   handle_keys(frame);
 
   const ImVec2 all = ImGui::GetIO().DisplaySize;
@@ -293,6 +342,7 @@ void Interface::draw(const ViewFrame& frame, const WindowTimes& times, double se
   // On a small window the picture goes first.
   const float right = panels && all.x > 560 * s ? 318 * s : 0;
   const float bottom = plots && panels && all.y > 420 * s ? 176 * s : 0;
+  fit_mesh(frame, all.x - right, all.y - bottom);
   place_picture(frame, all.x - right, all.y - bottom);
   handle_picture(frame, seconds);
   settings_.compare = compare_ != CompareView::none;
@@ -423,8 +473,7 @@ void Interface::draw_motion(const ViewFrame& frame) {
   mark("step");
   ImGui::SameLine(0, 4);
   if (ImGui::Button("Reset", {third, 0})) {
-    settings_.yaw = settings_.pitch = yaw_speed_ = pitch_speed_ = 0;
-    actions_.emplace_back(Rewind{});
+    reset_view();
   }
   mark("reset");
   const float half = 0.5f * (ImGui::GetContentRegionAvail().x - 4);
@@ -529,7 +578,7 @@ void Interface::draw_help() {
                    ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings);
   for (const HelpLine& line : kHelp) {
     ImGui::TextColored({0.95f, 0.62f, 0.20f, 1}, "%s", line.key);
-    ImGui::SameLine(150 * static_cast<float>(scale_));
+    ImGui::SameLine(180 * static_cast<float>(scale_));
     ImGui::TextUnformatted(line.what);
   }
   ImGui::Spacing();
@@ -601,7 +650,7 @@ void Interface::draw_overlay(const ViewFrame& frame) {
       draw.AddText({std::clamp(at - 8 * s, x, x + width - 18 * s), y + 7 * s}, white, text.c_str());
     }
   }
-  if (message_age_ < kMessageSeconds || (message_failed_ && message_age_ < 3 * kMessageSeconds)) {
+  if (message_shown_) {
     const ImVec2 all = ImGui::GetIO().DisplaySize;
     label(12 * s, all.y - (plots && panels && all.y > 420 * s ? 176 * s : 0) - line - 12 * s,
           message_failed_ ? IM_COL32(255, 140, 120, 255) : white, message_);

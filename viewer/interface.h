@@ -2,6 +2,7 @@
 
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -65,8 +66,8 @@ class Interface {
   std::optional<std::filesystem::path> take_screenshot() {
     return std::exchange(screenshot_, std::nullopt);
   }
-  /// Whether a message is about to go.
-  bool message_fading() const;
+  /// Whether the message on the screen has had its time, so that one more frame takes it away.
+  bool message_over() const;
   const std::filesystem::path& folder() const { return browser_.folder; }
   void set_folder(const std::filesystem::path& folder) { browser_.folder = folder; }
   const std::string& message() const { return message_; }
@@ -85,6 +86,9 @@ class Interface {
  private:
   void handle_keys(const ViewFrame& frame);
   void handle_picture(const ViewFrame& frame, double seconds);
+  void handle_view(const ViewFrame& frame, bool over_picture);
+  void reset_view();
+  void fit_mesh(const ViewFrame& frame, float right, float bottom);
   void place_picture(const ViewFrame& frame, float right, float bottom);
   void draw_controls(const ViewFrame& frame, const WindowTimes& times, float width);
   void draw_file_row(const ViewFrame& frame);
@@ -105,6 +109,7 @@ class Interface {
   CompareView compare_ = CompareView::none;
   double split_ = 0.5;
   bool dragging_split_ = false, dragging_light_ = false;
+  int view_button_ = -1;  // that turns or moves a mesh
   bool inertia_ = false;
   double yaw_speed_ = 0, pitch_speed_ = 0;  // radians a second
   bool help_ = false, quit_ = false;
@@ -114,7 +119,8 @@ class Interface {
   std::map<std::string, Area> marks_;
   std::string message_;
   bool message_failed_ = false;
-  double message_age_ = 1e9;
+  bool message_shown_ = false;
+  std::chrono::steady_clock::time_point message_since_;
   std::optional<std::filesystem::path> screenshot_;
   FileBrowser browser_;
   History history_;

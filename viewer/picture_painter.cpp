@@ -163,9 +163,9 @@ void PicturePainter::upload(const ViewFrame& frame) {
   picture_.fill(frame.picture);
   compared_ = frame.compared;
   if (compared_) reference_.fill(frame.reference);
-  if (frame.scene != scene_) {
-    scene_ = frame.scene;
-    coverage_.fill(frame.picture.width, frame.picture.height, scene_->transport.coverage());
+  if (frame.view_number != view_) {
+    view_ = frame.view_number;
+    coverage_.fill(frame.picture.width, frame.picture.height, frame.coverage);
   }
   if (frame.from != light_from_) {
     light_from_ = frame.from;

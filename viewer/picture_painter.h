@@ -2,6 +2,7 @@
 
 #pragma once
 
+#include <cstdint>
 #include <memory>
 
 #include "prt/tonemap.h"
@@ -42,7 +43,7 @@ class PicturePainter {
   std::unique_ptr<Uniforms> at_;
   Texture picture_, reference_, coverage_, from_, to_, ramp_;
   bool compared_ = false;
-  std::shared_ptr<const OpenScene> scene_;
+  std::uint64_t view_ = 0;
   std::shared_ptr<const OpenLight> light_from_, light_to_;
   LightState light_;
   Camera camera_;

@@ -13,6 +13,7 @@
 #include "core/parallel.h"
 #include "prt/image_relighter.h"
 #include "prt/motion_background.h"
+#include "prt/picture_relighter.h"
 #include "prt/tonemap.h"
 #include "viewer/lighting_picture.h"
 
@@ -46,6 +47,11 @@ void check(const ViewSettings& s) {
   if (!(s.milliseconds > 0)) refuse("milliseconds", s.milliseconds, "more than 0");
   if (!(s.speed >= 0 && s.speed <= 1000)) refuse("speed", s.speed, "0 to 1000");
   if (!std::isfinite(s.yaw) || !std::isfinite(s.pitch)) refuse("yaw", s.yaw, "finite angles");
+  if (!std::isfinite(s.orbit) || !(std::abs(s.elevation) <= kPi)) {
+    refuse("elevation", s.elevation, "finite angles");
+  }
+  if (!(std::abs(s.closer) <= 6)) refuse("closer", s.closer, "-6 to 6");
+  if (!(std::abs(s.right) <= 100 && std::abs(s.up) <= 100)) refuse("right", s.right, "-100 to 100");
   if (s.disc_count < 0 || s.disc_count > kMaxDiscs) refuse("lights", s.disc_count, "0 to 8");
 }
 
@@ -61,6 +67,35 @@ Image latlong_preview(const Environment& environment, int height) {
     }
   });
   return preview;
+}
+
+Camera orbit_camera(const Camera& file, const BoundingSphere& middle,
+                    const ViewSettings& settings) {
+  Camera camera = turned_about(file, middle.center, settings.orbit);
+  if (settings.elevation != 0) {
+    // Up and over, about the camera's own right, stopping short of the poles.
+    const Vec3 away = camera.position - middle.center;
+    const double distance = std::max(length(away), 1e-9);
+    const double now = std::asin(std::clamp(away.y / distance, -1.0, 1.0));
+    const double most = 0.49 * kPi;
+    const double turn = std::clamp(now + settings.elevation, -most, most) - now;
+    const Rotation t = camera.orientation.transposed();
+    const Vec3 right = normalize(Vec3{t.row[0].x, 0, t.row[0].z});
+    // The rotation about `right`: to a frame with it as +X, about that, and back.
+    const Vec3 up{0, 1, 0}, back = cross(right, up);
+    const Rotation frame{{right, up, back}};
+    const Rotation over = frame.transposed() * rotation_x(-turn) * frame;
+    camera.position = middle.center + over * away;
+    camera.orientation = over * camera.orientation;
+  }
+  camera.position = middle.center + (camera.position - middle.center) * std::exp2(-settings.closer);
+  const double height =
+      2 * std::tan(0.5 * camera.vertical_fov) * length(camera.position - middle.center);
+  camera.position = camera.position +
+                    camera.orientation * Vec3{-settings.right * height, -settings.up * height, 0};
+  if (settings.width > 0) camera.width = settings.width;
+  if (settings.height > 0) camera.height = settings.height;
+  return camera;
 }
 
 Session::Session() = default;
@@ -113,7 +148,12 @@ void Session::open_transport(const std::filesystem::path& file) {
   LightRig rig(scene->transport.layout());
   for (std::size_t i = 0; i < lights_.size(); ++i) rig.set_environment(i, lights_[i]->environment);
   FrameRelighter relighter(scene->transport, {}, WaveletWeight::area);
+  middle_ = scene->transport.kind() == TransportKind::mesh
+                ? bounding_sphere(*scene->transport.info().mesh)
+                : BoundingSphere{};
   scene_ = std::move(scene);
+  ++view_number_;
+  camera_.reset();
   rig_.emplace(std::move(rig));
   relighter_.emplace(std::move(relighter));
   next_start_ = FrameStart::exact;
@@ -187,6 +227,15 @@ void Session::set_light(const ViewSettings& settings) {
   }
 }
 
+void Session::set_view(const ViewSettings& settings) {
+  if (scene_->transport.kind() != TransportKind::mesh) return;
+  const Camera camera = orbit_camera(scene_->transport.info().camera, middle_, settings);
+  if (camera_ && *camera_ == camera) return;
+  camera_ = camera;
+  ++view_number_;
+  relighter_->set_camera(camera);
+}
+
 void Session::move_on(const ViewSettings& settings, double ticks) {
   if (fade_ > 0) {
     blend_ = std::min(1.0, blend_ + fade_ * ticks);
@@ -237,6 +286,7 @@ bool Session::advance(const ViewSettings& settings, double ticks, ViewFrame& out
       settings.budget == BudgetKind::wavelets ? settings.wavelets : budget_.wavelets();
   relighter_->set_options(lighting, settings.weight);
   relighter_->compare_with_reference(settings.compare);
+  set_view(settings);
   const int number = static_cast<int>(frames_);
   metrics_ = relighter_->relight(target, next_start_, number);
   if (settings.budget == BudgetKind::milliseconds && next_start_ == FrameStart::advance) {
@@ -244,13 +294,16 @@ bool Session::advance(const ViewSettings& settings, double ticks, ViewFrame& out
                      relighter_->tracker().layout().size());
   }
   if (recording_now_) {
+    std::optional<Camera> camera;
+    if (scene_->transport.kind() == TransportKind::mesh) camera = relighter_->view().camera;
     recording_.frames.push_back(
-        {light_, settings.method, lighting.wavelets, settings.weight, next_start_});
+        {light_, settings.method, lighting.wavelets, settings.weight, next_start_, camera});
   }
   if (!exposure_) {
-    exposure_ = auto_exposure_ev(next_start_ == FrameStart::exact
-                                     ? relighter_->picture()
-                                     : relight_once(scene_->transport, target));
+    exposure_ = auto_exposure_ev(
+        next_start_ == FrameStart::exact
+            ? relighter_->picture()
+            : relight_picture_once(scene_->transport, target, relighter_->view().camera));
   }
   allowed_ = lighting.wavelets;
   next_start_ = FrameStart::advance;
@@ -273,7 +326,10 @@ void Session::fill(const ViewSettings& settings, ViewFrame& out) {
   out.picture = relighter_->picture();
   out.compared = relighter_->reference() != nullptr;
   if (out.compared) out.reference = *relighter_->reference();
-  out.camera = scene_->transport.info().camera;
+  const SceneView view = relighter_->view();
+  out.camera = view.camera;
+  out.coverage.assign(view.coverage.begin(), view.coverage.end());
+  out.view_number = view_number_;
   out.metrics = metrics_;
   out.light_ms = light_ms_;
   out.budget = allowed_;
@@ -304,7 +360,7 @@ Image Session::picture_with_background() const {
   Image picture = relighter_->picture();
   std::vector<Environment> environments;
   for (const auto& light : lights_) environments.push_back(light->environment);
-  composite_light_background(scene_->transport, light_, environments, picture);
+  composite_light_background(relighter_->view(), light_, environments, picture);
   return picture;
 }
 

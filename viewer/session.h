@@ -10,6 +10,7 @@
 #include "prt/frame_relighter.h"
 #include "prt/light_rig.h"
 #include "prt/motion_file.h"
+#include "prt/transport_mesh.h"
 #include "viewer/budget.h"
 #include "viewer/settings.h"
 #include "viewer/view_frame.h"
@@ -51,6 +52,7 @@ class Session {
   void open_environment(const OpenEnvironment& open);
   void start_recording();
   void set_light(const ViewSettings& settings);
+  void set_view(const ViewSettings& settings);
   void move_on(const ViewSettings& settings, double ticks);
   void fill(const ViewSettings& settings, ViewFrame& out);
   void fill_lighting(ViewFrame& out);
@@ -60,6 +62,9 @@ class Session {
   std::optional<LightRig> rig_;
   std::optional<FrameRelighter> relighter_;
   std::optional<double> exposure_;
+  BoundingSphere middle_;  // of a mesh
+  std::uint64_t view_number_ = 0;
+  std::optional<Camera> camera_;  // that a mesh is drawn from
   BudgetController budget_;
 
   int from_ = -1, to_ = -1;
@@ -78,6 +83,9 @@ class Session {
   int allowed_ = 0;  // wavelets of the last frame
   MotionRecording recording_;
 };
+
+/// Where a mesh is seen from: `file` is its transport's camera, `middle` what it turns about.
+Camera orbit_camera(const Camera& file, const BoundingSphere& middle, const ViewSettings& settings);
 
 /// Lat-long picture of an environment as it arrives, `height` high.
 Image latlong_preview(const Environment& environment, int height);

@@ -39,6 +39,13 @@ struct ViewSettings {
   bool loop = true;     ///< begin again when the motion has rested for a second
   bool playing = false;
 
+  // From where a mesh is seen; a picture's view is fixed.
+  double orbit = 0,
+         elevation = 0;       ///< radians, right-handed about +Y, and up, from the file's view
+  double closer = 0;          ///< halvings of the distance to the middle, [-6, 6]
+  double right = 0, up = 0;   ///< of the middle, in heights of the picture
+  int width = 0, height = 0;  ///< pixels; 0: the file's
+
   bool compare = false;        ///< relight exactly too
   bool show_lighting = false;  ///< fill ViewFrame::target, shown and touched
 

@@ -104,8 +104,7 @@ std::string show(const RunOptions& options, double scale) {
     if (due > 0 || scripted || interface.moving()) {
       glfwPollEvents();
     } else {
-      const bool rest = script && script->resting();
-      glfwWaitEventsTimeout(rest ? 0.1 : kSleep);
+      glfwWaitEventsTimeout(kSleep);
     }
     const bool new_frame = worker.update();
     for (const Notice& notice : worker.take_notices()) {
@@ -113,7 +112,7 @@ std::string show(const RunOptions& options, double scale) {
       due = kFramesAfterEvent;
     }
     if (window.take_activity()) due = kFramesAfterEvent;
-    if (new_frame || interface.message_fading()) due = std::max(due, 1);
+    if (new_frame || interface.message_over()) due = std::max(due, 1);
     if (script && !script->done()) {
       script->before_frame(window, interface, worker, !new_frame);
       ended |= script->wants_close();

@@ -43,6 +43,8 @@ struct ViewFrame {
   Image reference;  ///< the same under the exact lighting, if `compared`
   bool compared = false;
   Camera camera;
+  std::vector<float> coverage;    ///< share of each pixel that the scene covers
+  std::uint64_t view_number = 0;  ///< another one whenever camera or coverage changed
 
   FrameMetrics metrics;
   double light_ms = 0;  ///< making the target lighting
