@@ -85,6 +85,13 @@ void draw_cubemap(const UnfoldedCube& unfolded, const Cubemap& map, double expos
   const auto factor = static_cast<float>(std::exp2(exposure_ev));
   const std::vector<int>& texels = unfolded.texels();
   rgba.resize(4 * texels.size());
+  // Coarse wavelets lie over everything and say nothing: the least count is the ground.
+  int least = 0, range = 1;
+  if (!touched.empty()) {
+    const auto [low, high] = std::minmax_element(touched.begin(), touched.end());
+    least = *low;
+    range = std::max(1, *high - *low);
+  }
   for (std::size_t i = 0; i < texels.size(); ++i) {
     std::uint8_t* out = &rgba[4 * i];
     if (texels[i] < 0) {
@@ -96,8 +103,8 @@ void draw_cubemap(const UnfoldedCube& unfolded, const Cubemap& map, double expos
     out[1] = display_byte(map.texels[t].g * factor);
     out[2] = display_byte(map.texels[t].b * factor);
     out[3] = 255;
-    if (!touched.empty() && touched[t] > 0) {
-      const double share = 1 - std::pow(0.6, touched[t]);
+    if (!touched.empty() && touched[t] > least) {
+      const double share = 0.8 * (touched[t] - least) / range;
       out[0] = mix(out[0], 255, share);
       out[1] = mix(out[1], 140, share);
       out[2] = mix(out[2], 30, share);

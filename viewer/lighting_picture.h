@@ -38,7 +38,8 @@ class UnfoldedCube {
 };
 
 /// Display bytes (RGBA, sRGB) of a cube map under an exposure, clamped; texels that `touched`
-/// counts are drawn over in orange, the stronger the more wavelets. `touched` may be empty.
+/// counts more often than the least are drawn over in orange, up to four fifths for the most.
+/// `touched` may be empty.
 void draw_cubemap(const UnfoldedCube& unfolded, const Cubemap& map, double exposure_ev,
                   const std::vector<std::uint16_t>& touched, std::vector<std::uint8_t>& rgba);
 

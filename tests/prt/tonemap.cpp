@@ -115,5 +115,30 @@ TEST(AutoExposure, BringsTheMeanLogLuminanceToMidGrey) {
   EXPECT_EQ(auto_exposure_ev(Image()), 0);
 }
 
+// A stop is the same step of colour at every exposure; what has no light is black.
+TEST(FalseColour, CountsStopsFromMidGrey) {
+  Image image(4, 1);
+  image.at(0, 0) = {0.18f, 0.18f, 0.18f};
+  image.at(1, 0) = {0.72f, 0.72f, 0.72f};
+  image.at(2, 0) = {0, -1, 0};
+  image.at(3, 0) = {1e30f, 1e30f, 1e30f};
+  const Image drawn = false_colour(image, -1);
+  const auto expect_near = [](const Rgb& a, const Rgb& b) {
+    // 0.18 and its logarithm are rounded to float: 2^-24 relative, steepest slope below 2 a stop.
+    EXPECT_LE(l1_norm(a - b), 1e-5f);
+  };
+  expect_near(drawn.at(0, 0), false_colour_of(-1));
+  expect_near(drawn.at(1, 0), false_colour_of(1));
+  EXPECT_EQ(drawn.at(2, 0), Rgb{});
+  EXPECT_EQ(drawn.at(3, 0), false_colour_of(kFalseColourStops));
+  EXPECT_EQ(false_colour_of(100), false_colour_of(kFalseColourStops));
+  // Blue below, green in the middle, red above, as Turbo is.
+  const Rgb low = false_colour_of(-3.5), mid = false_colour_of(0), high = false_colour_of(4);
+  EXPECT_GT(low.b, low.r);
+  EXPECT_GT(mid.g, mid.b);
+  EXPECT_GT(high.r, high.g);
+  EXPECT_THROW(false_colour(image, std::numeric_limits<double>::infinity()), Error);
+}
+
 }  // namespace
 }  // namespace haarlight

@@ -81,8 +81,14 @@ TEST(DrawCubemap, ShowsExposedRadianceAndTints) {
   std::vector<std::uint16_t> touched(6, 0);
   touched[static_cast<std::size_t>(cross.texels()[i])] = 50;
   draw_cubemap(cross, map, 1, touched, rgba);
-  EXPECT_EQ(rgba[4 * i], 255);
-  EXPECT_EQ(rgba[4 * i + 1], 140);
+  // Four fifths of (255, 140, 30) over what was there, rounded.
+  EXPECT_NEAR(rgba[4 * i], 0.2 * 187.5 + 0.8 * 255, 1);
+  EXPECT_NEAR(rgba[4 * i + 1], 0.8 * 140, 1);
+  const std::vector<std::uint16_t> everywhere(6, 3);
+  std::vector<std::uint8_t> plain, same;
+  draw_cubemap(cross, map, 1, {}, plain);
+  draw_cubemap(cross, map, 1, everywhere, same);
+  EXPECT_EQ(same, plain);
 }
 
 }  // namespace
