@@ -1,4 +1,4 @@
-// Turns SIGINT and SIGTERM into a flag.
+// Turns SIGINT and SIGTERM into a flag, and SIGXFSZ into failed writes.
 
 #include "apps/interrupt.h"
 
@@ -19,6 +19,8 @@ void on_signal(int signal_number) {
 void catch_interrupts() {
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
+  // A file that grows past its limit is an error of the write, not the end.
+  std::signal(SIGXFSZ, SIG_IGN);
 }
 
 bool interrupted() { return g_interrupted != 0; }

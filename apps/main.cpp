@@ -68,6 +68,7 @@ int main(int argc, char** argv) {
   add("relight", "Relights a transport file under a moving environment; pictures and metrics",
       haarlight::add_relight);
   add("compare", "Says how far apart two pictures are", haarlight::add_compare);
+  add("merge", "Joins the shards of one precomputation", haarlight::add_merge);
   add("info", "Checks a transport file and says what is in it", haarlight::add_info);
 
   try {

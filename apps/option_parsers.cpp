@@ -144,6 +144,21 @@ double parse_number(const std::string& option, const std::string& text, double l
   return *value;
 }
 
+std::uint64_t parse_byte_size(const std::string& option, const std::string& text) {
+  std::string number = text;
+  double unit = 1;
+  const std::string units = "KMGT";
+  if (!number.empty() && units.find(number.back()) != std::string::npos) {
+    unit = std::exp2(10.0 * static_cast<double>(units.find(number.back()) + 1));
+    number.pop_back();
+  }
+  const std::optional<double> value = whole_text_as<double>(number);
+  if (!value || !std::isfinite(*value) || !(*value * unit >= 1) || *value * unit > 1e18) {
+    refuse_option(option, text, "a size above 0 in bytes, or with K, M, G or T, as 200M or 1.5G");
+  }
+  return static_cast<std::uint64_t>(*value * unit);
+}
+
 std::vector<std::string> parse_words(const std::string& option, const std::string& text,
                                      const std::vector<std::string>& choices) {
   std::vector<std::string> words = split(text, ',');

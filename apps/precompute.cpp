@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <cstdio>
+#include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <tuple>
 
@@ -12,6 +14,7 @@
 #include "apps/outputs.h"
 #include "apps/progress_printer.h"
 #include "apps/repairs.h"
+#include "apps/run_options.h"
 #include "apps/verbs.h"
 #include "core/error.h"
 #include "precompute/default_stage.h"
@@ -34,11 +37,15 @@ struct PrecomputeCommand {
   void run();
 
  private:
-  void print_summary(const Stage& made, const PrecomputeReport& report) const;
   void print_mesh(const MeshReport& report) const;
 };
 
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
 void PrecomputeCommand::run() {
+  const auto begin = std::chrono::steady_clock::now();
   // Long work must not end at a place that cannot be written.
   require_writable_file(output);
 
@@ -52,39 +59,29 @@ void PrecomputeCommand::run() {
   stage.use_scene_camera = view != View::framing;
   const Stage made = set_stage(imported, stage);
 
-  try {
+  options.scene_file = scene;
+  PrecomputeReport report;
+  std::optional<MeshReport> mesh;
+  {
     ProgressPrinter progress("precompute");
     const Progress show = [&](double share) { return progress(share); };
+    MeshOptions watched = options;
+    static_cast<RunOptions&>(watched) = watched_by(progress, options);
+    if (watched.time_limit > 0) {  // importing counts
+      watched.time_limit = std::max(0.05, watched.time_limit - seconds_since(begin));
+    }
     if (vertices) {
-      const MeshReport report = precompute_mesh(imported, made.camera, options, output, show);
-      print_summary(made, report.run);
-      print_mesh(report);
+      mesh = precompute_mesh(imported, made.camera, watched, output, show);
+      report = mesh->run;
     } else {
-      print_summary(made, precompute_image(imported, made.camera, options, output, show));
+      report = precompute_image(imported, made.camera, watched, output, show);
     }
-  } catch (const Error& error) {
-    if (error.kind() != ErrorKind::cancelled) throw;
-    const std::filesystem::path journal = output.string() + ".partial";
-    if (!std::filesystem::exists(journal)) {
-      throw Error(ErrorKind::cancelled, "stopped before any part was done; nothing was written");
-    }
-    throw Error(ErrorKind::cancelled,
-                fmt::format("stopped; the part done is kept in {}, and the same command with "
-                            "--resume goes on from there",
-                            journal.string()));
   }
-}
-
-void PrecomputeCommand::print_summary(const Stage& made, const PrecomputeReport& report) const {
   fmt::print("{}: {}x{} pixels, {}{}\n", output.string(), stage.width, stage.height,
              made.camera_made ? "framing camera" : "camera of the scene",
              made.ground_added ? ", ground added" : "");
-  fmt::print("{:.1f} MiB, {:.1f} million rays, {:.1f} s, measured picture error {:.3g}\n",
-             static_cast<double>(report.bytes) / (1024.0 * 1024.0),
-             static_cast<double>(report.rays) * 1e-6, report.seconds, report.measured_error);
-  if (report.resumed_tiles > 0) {
-    fmt::print("{} of {} tiles were there already\n", report.resumed_tiles, report.tiles);
-  }
+  if (mesh) print_mesh(*mesh);
+  print_outcome(output, options, report);
 }
 
 void PrecomputeCommand::print_mesh(const MeshReport& report) const {
@@ -177,20 +174,19 @@ Verb add_precompute(CLI::App& verb) {
       ->needs(per_vertex)
       ->group("Mesh");
 
-  add_threads(verb)->group("Running");
-  verb.add_flag("--resume", c.options.resume,
-                "go on with FILE.hlt.partial of a run that was cut off, if it is there and fits")
-      ->group("Running");
+  add_run_options(verb, c.options);
 
   verb.footer(
       "\nA mesh without material, camera or ground gets grey diffuse, a framing camera and a "
       "plane.\n"
-      "The file appears when it is complete; until then the part done is in FILE.hlt.partial.\n\n"
+      "Until the file is complete the part done is in FILE.hlt.partial. Ctrl-C (or --time-limit)\n"
+      "leaves that and a file whose missing parts are a preview; a second Ctrl-C ends at once.\n\n"
       "Examples:\n"
       "  haarlight precompute bunny.obj -o bunny.hlt\n"
       "  haarlight precompute bunny.obj -o mesh.hlt --vertices --face 32\n"
       "  haarlight precompute room.glb -o room.hlt --size 1280x720 --error 0.005\n"
-      "  haarlight precompute room.glb -o room.hlt --size 1280x720 --error 0.005 --resume");
+      "  haarlight precompute room.glb -o room.hlt --size 1280x720 --error 0.005 --resume\n"
+      "  haarlight precompute room.glb -o room.hlt --time-limit 600 --max-bytes 200M");
   return [command] { command->run(); };
 }
 

@@ -15,5 +15,6 @@ Verb add_precompute(CLI::App& verb);
 Verb add_relight(CLI::App& verb);
 Verb add_compare(CLI::App& verb);
 Verb add_info(CLI::App& verb);
+Verb add_merge(CLI::App& verb);
 
 }  // namespace haarlight

@@ -49,6 +49,8 @@ void add_options(ContentHash& hash, const TraceOptions& options) {
       hash.add(options.seed);
 }
 
-void add_options(ContentHash& hash, const RunOptions& options) { hash.add(options.error); }
+void add_options(ContentHash& hash, const RunOptions& options) {
+  hash.add(options.error), hash.add(options.max_bytes);
+}
 
 }  // namespace haarlight

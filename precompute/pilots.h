@@ -14,8 +14,9 @@ namespace haarlight {
 inline constexpr int kPilotTiles = 64;
 
 /// Numbers of up to kPilotTiles tiles spread evenly over those that show the scene. `order` is the
-/// row order of all tiles.
-std::vector<int> choose_pilots(TileSource::Worker& worker, std::span<const std::uint32_t> order);
+/// row order of all tiles; `seen` gets how many of them show the scene.
+std::vector<int> choose_pilots(TileSource::Worker& worker, std::span<const std::uint32_t> order,
+                               int& seen);
 
 /// Traces the pilots, a thread a tile, and hands their rows to `take`, in order. `done` is told of
 /// finished tiles. Returns the rays traced.

@@ -5,7 +5,9 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <optional>
 
+#include "precompute/distribution.h"
 #include "precompute/fingerprint.h"
 #include "precompute/picture_tiles.h"
 #include "precompute/run_checks.h"
@@ -15,21 +17,23 @@
 namespace haarlight {
 namespace {
 
-std::string meta_json(const Scene& scene, const PrecomputeOptions& options) {
+std::string meta_json(const Scene& scene, const PrecomputeOptions& options,
+                      const std::filesystem::path& file, const std::string& fingerprint) {
   const TraceOptions& t = options.trace;
-  const nlohmann::json meta{{"generator", fmt::format("haarlight tracer {}", kTracerVersion)},
-                            {"scene", scene_meta(scene)},
-                            {"options",
-                             {{"face", t.face_size},
-                              {"spp", t.spp},
-                              {"adaptive", t.adaptive},
-                              {"pixel_samples", t.pixel_samples},
-                              {"error", options.error},
-                              {"indirect_face", t.indirect_face},
-                              {"noise", t.noise},
-                              {"paths", t.paths},
-                              {"seed", t.seed}}},
-                            {"effects", to_string(t.effects)}};
+  nlohmann::json meta{{"generator", fmt::format("haarlight tracer {}", kTracerVersion)},
+                      {"scene", scene_meta(scene)},
+                      {"options",
+                       {{"face", t.face_size},
+                        {"spp", t.spp},
+                        {"adaptive", t.adaptive},
+                        {"pixel_samples", t.pixel_samples},
+                        {"error", options.error},
+                        {"indirect_face", t.indirect_face},
+                        {"noise", t.noise},
+                        {"paths", t.paths},
+                        {"seed", t.seed}}},
+                      {"effects", to_string(t.effects)}};
+  add_origin(meta, options, file, fingerprint);
   return meta.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
@@ -49,21 +53,24 @@ std::string precompute_fingerprint(const Scene& scene, const Camera& camera,
 PrecomputeReport precompute_image(const Scene& scene, const Camera& camera,
                                   const PrecomputeOptions& options,
                                   const std::filesystem::path& file, const Progress& progress) {
-  check(static_cast<const RunOptions&>(options));
-  check(options.trace);
-  check(camera);
-  check_output(file);
-
-  const Visibility visibility(scene);
-  const PictureTiles tiles(scene, visibility, camera, options.trace);
+  std::optional<Visibility> visibility;
+  std::optional<PictureTiles> tiles;
+  together(options.distribution, [&] {
+    check(static_cast<const RunOptions&>(options));
+    check(options.trace);
+    check(camera);
+    check_output(file);
+    visibility.emplace(scene);
+    tiles.emplace(scene, *visibility, camera, options.trace);
+  });
   TileRun run;
   run.info.face_size = options.trace.face_size;
   run.info.width = camera.width;
   run.info.height = camera.height;
   run.info.camera = camera;
   run.fingerprint = precompute_fingerprint(scene, camera, options);
-  run.meta = meta_json(scene, options);
-  return run_tiles(tiles, run, options, file, progress);
+  run.meta = meta_json(scene, options, file, run.fingerprint);
+  return run_tiles(*tiles, run, options, file, progress);
 }
 
 }  // namespace haarlight

@@ -18,14 +18,16 @@ struct PrecomputeOptions : RunOptions {
   TraceOptions trace;  ///< resolution and rays; see precompute/tile_tracer.h
 };
 
-/// Traces direct light from every direction for each pixel of `camera` and writes `file`:
+/// Traces the light that each pixel of `camera` gets from every direction and writes `file`:
 ///   pilot tiles -> thresholds -> every tile traced, transformed, compressed -> file
-/// Runs on all threads of core/parallel.h; the file is the same bytes on any number of them, and
-/// whether or not a run was cut off and resumed. Memory: 6.3 MB a thread at 64x64 faces (three
-/// times that while a tile has coloured blocks), the scene, and what Embree makes of it.
+/// on all threads of core/parallel.h, as far as memory allows; the same bytes on any number of them
+/// and of processes, and whether or not a run was cut off and resumed.
+///
+/// A run that ends early, because `progress` says so or by the time limit, leaves its journal and a
+/// file whose missing tiles are previews: report.complete is false, and so is "complete" in the
+/// file. A whole file that is there already gives way to a preview only at the time limit.
 /// Throws Error{invalid_argument} for an option outside its range, Error{missing} for a scene
-/// without triangles, Error{io} if the file cannot be written, Error{cancelled} when `progress`
-/// says so (FILE.partial stays).
+/// without triangles, Error{io} if the file cannot be written (the old one stays).
 PrecomputeReport precompute_image(const Scene& scene, const Camera& camera,
                                   const PrecomputeOptions& options,
                                   const std::filesystem::path& file, const Progress& progress = {});

@@ -8,8 +8,10 @@
 #include <chrono>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "core/error.h"
+#include "precompute/distribution.h"
 #include "precompute/fingerprint.h"
 #include "precompute/mesh_tiles.h"
 #include "precompute/run_checks.h"
@@ -25,22 +27,24 @@ constexpr int kVertexVersion = 1;
 
 constexpr double kSubdivisionShare = 0.1;  // of the progress shown
 
-std::string meta_json(const Scene& scene, const MeshOptions& options, const MeshReport& report) {
+std::string meta_json(const Scene& scene, const MeshOptions& options, const MeshReport& report,
+                      const std::filesystem::path& file, const std::string& fingerprint) {
   const TraceOptions& t = options.trace;
-  const nlohmann::json meta{{"generator", fmt::format("haarlight tracer {}", kTracerVersion)},
-                            {"scene", scene_meta(scene)},
-                            {"options",
-                             {{"face", t.face_size},
-                              {"spp", t.spp},
-                              {"adaptive", t.adaptive},
-                              {"error", options.error},
-                              {"noise", t.noise},
-                              {"paths", t.paths},
-                              {"seed", t.seed},
-                              {"subdivide", options.subdivide},
-                              {"max_vertices", options.max_vertices}}},
-                            {"view_dependent_vertices", report.view_dependent},
-                            {"effects", to_string(t.effects)}};
+  nlohmann::json meta{{"generator", fmt::format("haarlight tracer {}", kTracerVersion)},
+                      {"scene", scene_meta(scene)},
+                      {"options",
+                       {{"face", t.face_size},
+                        {"spp", t.spp},
+                        {"adaptive", t.adaptive},
+                        {"error", options.error},
+                        {"noise", t.noise},
+                        {"paths", t.paths},
+                        {"seed", t.seed},
+                        {"subdivide", options.subdivide},
+                        {"max_vertices", options.max_vertices}}},
+                      {"view_dependent_vertices", report.view_dependent},
+                      {"effects", to_string(t.effects)}};
+  add_origin(meta, options, file, fingerprint);
   return meta.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
@@ -81,44 +85,54 @@ std::string mesh_fingerprint(const Scene& scene, const Camera& camera, const Mes
 
 MeshReport precompute_mesh(const Scene& scene, const Camera& camera, const MeshOptions& options,
                            const std::filesystem::path& file, const Progress& progress) {
-  check(static_cast<const RunOptions&>(options));
-  check(options.trace);
-  check(camera);
-  check_output(file);
   MeshReport report;
-
-  // More vertices where the light on them changes.
-  const Visibility visibility(scene);
-  const auto start = std::chrono::steady_clock::now();
-  SubdivideOptions finer;
-  finer.tolerance = std::max(0.005, options.error);
-  finer.max_vertices = options.max_vertices;
-  const double first = options.subdivide ? kSubdivisionShare : 0;
-  const auto subdividing = [&](double share) { return !progress || progress(first * share); };
-  const Scene fine = options.subdivide
-                         ? subdivide(scene, visibility, finer, &report.subdivision, subdividing)
-                         : scene;
-  report.subdivision.vertices = static_cast<std::int64_t>(fine.position.size());
-  report.subdivision.triangles = static_cast<std::int64_t>(fine.triangle.size());
-  report.subdivision_seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-
-  const VertexSampler sampler(fine, visibility);
-  report.view_dependent = sampler.view_dependent();
-  const MeshTiles tiles(sampler, scene, visibility, options.trace);
+  std::optional<Scene> fine;
+  std::optional<Visibility> visibility;
+  std::optional<VertexSampler> sampler;
+  std::optional<MeshTiles> tiles;
   TileRun run;
-  run.info.kind = TransportKind::mesh;
-  run.info.face_size = options.trace.face_size;
-  run.info.width = camera.width;
-  run.info.height = camera.height;
-  run.info.camera = camera;
-  run.info.mesh = std::make_shared<const TransportMesh>(transport_mesh(fine));
-  run.fingerprint = mesh_fingerprint(scene, camera, options);
-  run.meta = meta_json(scene, options, report);
+  const double first = options.subdivide ? kSubdivisionShare : 0;
+  const auto start = std::chrono::steady_clock::now();
+  const auto seconds = [&] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  };
+  together(options.distribution, [&] {
+    check(static_cast<const RunOptions&>(options));
+    check(options.trace);
+    check(camera);
+    check_output(file);
+
+    // More vertices where the light on them changes.
+    visibility.emplace(scene);
+    SubdivideOptions finer;
+    finer.tolerance = std::max(0.005, options.error);
+    finer.max_vertices = options.max_vertices;
+    const auto subdividing = [&](double share) { return !progress || progress(first * share); };
+    fine = options.subdivide
+               ? subdivide(scene, *visibility, finer, &report.subdivision, subdividing)
+               : scene;
+    report.subdivision.vertices = static_cast<std::int64_t>(fine->position.size());
+    report.subdivision.triangles = static_cast<std::int64_t>(fine->triangle.size());
+    report.subdivision_seconds = seconds();
+
+    sampler.emplace(*fine, *visibility);
+    report.view_dependent = sampler->view_dependent();
+    tiles.emplace(*sampler, scene, *visibility, options.trace);
+    run.info.kind = TransportKind::mesh;
+    run.info.face_size = options.trace.face_size;
+    run.info.width = camera.width;
+    run.info.height = camera.height;
+    run.info.camera = camera;
+    run.info.mesh = std::make_shared<const TransportMesh>(transport_mesh(*fine));
+    run.fingerprint = mesh_fingerprint(scene, camera, options);
+    run.meta = meta_json(scene, options, report, file, run.fingerprint);
+  });
+  RunOptions rest = options;
+  if (rest.time_limit > 0) rest.time_limit = std::max(0.01, rest.time_limit - seconds());
   const auto tracing = [&](double share) {
     return !progress || progress(first + (1 - first) * share);
   };
-  report.run = run_tiles(tiles, run, options, file, tracing);
+  report.run = run_tiles(*tiles, run, rest, file, tracing);
   return report;
 }
 

@@ -16,6 +16,16 @@ void check(const RunOptions& options) {
     throw Error(ErrorKind::invalid_argument,
                 fmt::format("error is {}, expected 0 or more and below 1", options.error));
   }
+  if (!(options.time_limit >= 0)) {
+    throw Error(ErrorKind::invalid_argument,
+                fmt::format("time limit is {} s, expected 0 or more", options.time_limit));
+  }
+  const Shard& shard = options.shard;
+  if (shard.index < 1 || shard.index > shard.count) {
+    throw Error(ErrorKind::invalid_argument,
+                fmt::format("shard {} of {}, expected 1 of 1 or more up to n of n", shard.index,
+                            shard.count));
+  }
 }
 
 void check(const Camera& camera) {

@@ -4,6 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "precompute/scene_files.h"
+
 namespace haarlight {
 
 nlohmann::json scene_meta(const Scene& scene) {
@@ -20,6 +22,14 @@ nlohmann::json scene_meta(const Scene& scene) {
           {"textures_missing", r.textures_missing},
           {"blended_materials", r.blended_materials},
           {"rough_glass", r.rough_glass}};
+}
+
+void add_origin(nlohmann::json& meta, const RunOptions& options,
+                const std::filesystem::path& output, const std::string& fingerprint) {
+  meta["fingerprint"] = fingerprint;
+  if (options.scene_file.empty()) return;
+  meta["scene_path"] = scene_path_from(options.scene_file, output);
+  meta["scene_hash"] = scene_files_hash(options.scene_file);
 }
 
 }  // namespace haarlight

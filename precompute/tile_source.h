@@ -35,6 +35,11 @@ class TileSource {
   virtual ~TileSource() = default;
   virtual const HaarLayout& layout() const = 0;
   virtual std::unique_ptr<Worker> make_worker() const = 0;
+  /// Bytes that a worker and the rows it makes take, at most, with those of compressing them.
+  virtual std::uint64_t worker_bytes() const {
+    const auto size = static_cast<std::uint64_t>(layout().size());
+    return 2 * 3 * kTileRows * size * sizeof(float) + (std::uint64_t{70} << 20) * size / 24576;
+  }
 };
 
 }  // namespace haarlight

@@ -103,7 +103,8 @@ JournalHead unpack_head(std::span<const std::byte> bytes, const std::string& nam
     return {ErrorKind::format,
             fmt::format("{}: {}, expected a journal or shard of haarlight precompute", name, why)};
   };
-  if (packed_head_size(bytes) != bytes.size()) throw refuse("does not begin like one");
+  if (bytes.empty() || packed_head_size(bytes) != bytes.size())
+    throw refuse("does not begin like one");
   FixedHead fixed;
   std::memcpy(&fixed, bytes.data(), sizeof fixed);
   const std::span<const std::byte> body = bytes.subspan(sizeof fixed);

@@ -30,9 +30,6 @@ struct AssemblyInput {
 TransportSummary assemble_transport(const std::filesystem::path& file, const AssemblyInput& input,
                                     const Progress& progress);
 
-/// Largest number of bytes that a file has beside the columns' entries: no limit below can be met.
-std::uint64_t transport_overhead_bytes(const TransportInfo& info);
-
 /// Throws Error{invalid_argument} for sizes that no file has.
 void check_info(const TransportInfo& info);
 

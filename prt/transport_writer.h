@@ -95,6 +95,9 @@ std::optional<std::vector<float>> journal_thresholds(const std::filesystem::path
                                                      const std::string& fingerprint,
                                                      const Shard& shard);
 
+/// Largest number of bytes that a file has beside the columns' entries.
+std::uint64_t transport_overhead_bytes(const TransportInfo& info);
+
 /// Throws Error{invalid_argument} naming the size needed if tables and indices alone are larger.
 void check_max_bytes(const TransportInfo& info, std::uint64_t max_bytes);
 

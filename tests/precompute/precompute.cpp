@@ -2,9 +2,11 @@
 
 #include "precompute/precompute.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <functional>
@@ -13,7 +15,11 @@
 
 #include "core/error.h"
 #include "core/parallel.h"
+#include "precompute/memory_budget.h"
+#include "precompute/picture_tiles.h"
+#include "prt/image_relighter.h"
 #include "prt/transport.h"
+#include "prt/transport_merge.h"
 #include "tests/precompute/shapes.h"
 
 namespace haarlight {
@@ -100,28 +106,167 @@ TEST_F(PrecomputeImage, FileKnowsItsSceneOptionsAndCoverage) {
   EXPECT_EQ(transport.coverage()[0], 0.0f);
 }
 
-TEST_F(PrecomputeImage, StoppedAndResumedGivesTheSameBytes) {
+// The picture of a transport under a sky of radiance 1, one channel a pixel.
+std::vector<double> white_picture(const fs::path& path) {
+  const Transport transport = Transport::open(path);
+  std::vector<Rgb> sky(static_cast<std::size_t>(transport.layout().size()));
+  for (int face = 0; face < 6; ++face) {  // only scaling coefficients: a constant
+    sky[static_cast<std::size_t>(face)] =
+        Rgb{1, 1, 1} * static_cast<float>(transport.info().face_size);
+  }
+  const Image picture = relight_once(transport, sky);
+  std::vector<double> green;
+  for (const Rgb& p : picture.pixels) green.push_back(static_cast<double>(p.g));
+  return green;
+}
+
+TEST_F(PrecomputeImage, StoppedLeavesAPreviewAndResumesToTheSameBytes) {
   make("whole.hlt");
-  int calls = 0;
-  EXPECT_EQ(kind_of([&] {
-              make("parts.hlt", [&](double share) { return ++calls < 20 || share > 0.99; });
-            }),
-            ErrorKind::cancelled);
-  EXPECT_FALSE(fs::exists(file("parts.hlt")));
+  // Pilots first (20 tiles, so 20 steps): then a few tiles.
+  const auto stopped = make("parts.hlt", [&](double share) { return share < 0.85; });
+  EXPECT_EQ(stopped.end, RunEnd::stopped);
+  EXPECT_FALSE(stopped.complete);
+  EXPECT_GT(stopped.tiles_traced, 0);
+  EXPECT_LT(stopped.tiles_traced, stopped.tiles);
+  const std::string meta = Transport::open(file("parts.hlt")).info().meta;
+  EXPECT_NE(meta.find("\"complete\": false"), std::string::npos) << meta;
+  EXPECT_NE(meta.find(fmt::format("\"tiles_traced\": {}", stopped.tiles_traced)),
+            std::string::npos);
+  // One row a block stands for 16: a coarse picture, but the right one in the mean.
+  const std::vector<double> right = white_picture(file("whole.hlt"));
+  const std::vector<double> coarse = white_picture(file("parts.hlt"));
+  double sum[2] = {0, 0}, difference = 0;
+  for (std::size_t i = 0; i < right.size(); ++i) {
+    sum[0] += right[i];
+    sum[1] += coarse[i];
+    difference += std::abs(right[i] - coarse[i]);
+  }
+  EXPECT_GT(difference, 0);
+  EXPECT_LT(difference, 0.25 * sum[0]);
+  EXPECT_NEAR(sum[1], sum[0], 0.1 * sum[0]);
+
   options_.resume = true;
   const PrecomputeReport report = make("parts.hlt");
-  EXPECT_GT(report.resumed_tiles, 0);
-  EXPECT_LT(report.resumed_tiles, report.tiles);
+  EXPECT_EQ(report.resumed_tiles, stopped.tiles_traced);
+  EXPECT_TRUE(report.complete);
   EXPECT_TRUE(bytes(file("parts.hlt")) == bytes(file("whole.hlt")));
+  EXPECT_FALSE(fs::exists(file("parts.hlt.partial")));
+}
+
+TEST_F(PrecomputeImage, APreviewDoesNotReplaceAWholeFile) {
+  make("a.hlt");
+  const std::string before = bytes(file("a.hlt"));
+  options_.error = 0.02;
+  const PrecomputeReport report = make("a.hlt", [&](double share) { return share < 0.85; });
+  EXPECT_EQ(report.end, RunEnd::stopped);
+  EXPECT_EQ(report.bytes, 0u);
+  EXPECT_TRUE(bytes(file("a.hlt")) == before);
+  EXPECT_TRUE(fs::exists(file("a.hlt.partial")));
+  // At the very beginning too, where there is nothing to keep but a glance.
+  options_.error = 0.03;
+  make("a.hlt", [](double) { return false; });
+  EXPECT_TRUE(bytes(file("a.hlt")) == before);
+  const PrecomputeReport early = make("b.hlt", [](double) { return false; });
+  EXPECT_EQ(early.tiles_traced, 0);
+  EXPECT_GT(early.bytes, 0u);
+  EXPECT_EQ(Transport::open(file("b.hlt")).coverage()[14 * 40 + 20], 1.0f);
+}
+
+TEST_F(PrecomputeImage, TimeLimitIsKept) {
+  // Dear tiles enough for a second or more, so that pilots are a small part.
+  options_.trace.spp = 3;
+  options_.trace.adaptive = false;
+  options_.trace.pixel_samples = 1;
+  camera_ = look_at({0.5, 1.5, 3}, {0, 0.3, 0}, 0.8, 160, 160);
+  const double whole = make("whole.hlt").seconds;
+  options_.time_limit = 0.5 * whole;
+  const PrecomputeReport report = make("limited.hlt");
+  EXPECT_EQ(report.end, RunEnd::time_limit);
+  EXPECT_FALSE(report.complete);
+  EXPECT_GT(report.bytes, 0u);
+  // Half a second for a machine that does other things too.
+  EXPECT_LT(report.seconds, options_.time_limit + 0.5);
+  options_.time_limit = 0;
+  options_.resume = true;
+  make("limited.hlt");
+  EXPECT_TRUE(bytes(file("limited.hlt")) == bytes(file("whole.hlt")));
+}
+
+TEST_F(PrecomputeImage, SizeLimitIsKept) {
+  const PrecomputeReport free = make("free.hlt");
+  EXPECT_FALSE(free.limited_by_size);
+  double last = free.measured_error;
+  for (const double part : {0.8, 0.5}) {
+    // Between what tables and indices need, at least, and what all of it took.
+    const std::uint64_t least = transport_overhead_bytes(Transport::open(file("free.hlt")).info());
+    options_.max_bytes =
+        std::max(least, static_cast<std::uint64_t>(part * static_cast<double>(free.bytes)));
+    const PrecomputeReport limited = make("limited.hlt");
+    EXPECT_LE(limited.bytes, options_.max_bytes);
+    EXPECT_TRUE(limited.limited_by_size);
+    EXPECT_GE(limited.measured_error, last);
+    last = limited.measured_error;
+  }
+  options_.max_bytes = 1000;
+  std::string message;
+  EXPECT_EQ(kind_of([&] { make("tiny.hlt"); }, &message), ErrorKind::invalid_argument);
+  EXPECT_NE(message.find("1000 bytes"), std::string::npos) << message;
+}
+
+TEST_F(PrecomputeImage, ShardsJoinToTheBytesOfOneRun) {
+  make("whole.hlt");
+  std::vector<fs::path> shards;
+  for (int i = 1; i <= 3; ++i) {
+    options_.shard = {i, 3};
+    const PrecomputeReport report = make("joined.hlt");
+    EXPECT_TRUE(report.complete);
+    EXPECT_EQ(report.bytes, 0u);
+    shards.push_back(journal_path(file("joined.hlt"), options_.shard));
+  }
+  EXPECT_FALSE(fs::exists(file("joined.hlt")));
+  std::swap(shards[0], shards[2]);
+  EXPECT_TRUE(merge_transport(file("joined.hlt"), shards).complete);
+  EXPECT_TRUE(bytes(file("joined.hlt")) == bytes(file("whole.hlt")));
+
+  const auto refused = [&](const std::vector<fs::path>& given, const std::string& words) {
+    std::string message;
+    kind_of([&] { merge_transport(file("joined.hlt"), given); }, &message);
+    EXPECT_NE(message.find(words), std::string::npos) << message;
+  };
+  refused({shards[0], shards[1]}, "shard 1 of 3 was not given");
+  refused({shards[0], shards[1], shards[1]}, "shard-2-of-3: is shard 2 of 3, as is");
+  options_.error = 0.02;
+  options_.shard = {1, 3};
+  make("other.hlt");
+  refused({shards[0], shards[1], journal_path(file("other.hlt"), options_.shard)},
+          "other.hlt.shard-1-of-3: was made from another");
+  std::ofstream(file("text")) << "no shard";
+  refused({file("text")}, "text: ");
+  fs::resize_file(shards[1], fs::file_size(shards[1]) - 1);
+  refused(shards, "shard-2-of-3: 1 of its 7 tiles are still to be traced");
 }
 
 TEST_F(PrecomputeImage, JournalOfOtherInputIsNotContinued) {
-  int calls = 0;
-  EXPECT_EQ(kind_of([&] { make("a.hlt", [&](double) { return ++calls < 20; }); }),
-            ErrorKind::cancelled);
+  make("a.hlt", [&](double share) { return share < 0.85; });
   options_.resume = true;
   scene_.material[0].albedo = {0.1f, 0.1f, 0.1f};
   EXPECT_EQ(make("a.hlt").resumed_tiles, 0);
+}
+
+TEST_F(PrecomputeImage, MemoryLimitsTheWorkers) {
+  set_thread_count(7);
+  // Room for the process as it is and two workers and a half.
+  const HaarLayout layout(options_.trace.face_size);
+  const Visibility visibility(scene_);
+  const PictureTiles tiles(scene_, visibility, camera_, options_.trace);
+  options_.memory = used_memory() + 5 * tiles.worker_bytes() / 2;
+  const PrecomputeReport report = make("a.hlt");
+  EXPECT_GE(report.workers, 1);
+  EXPECT_LE(report.workers, 3);  // a page more or less may be in use by then
+  options_.memory = 1 << 20;
+  std::string message;
+  EXPECT_EQ(kind_of([&] { make("b.hlt"); }, &message), ErrorKind::invalid_argument);
+  EXPECT_NE(message.find("memory of 1 MiB"), std::string::npos) << message;
 }
 
 TEST_F(PrecomputeImage, FingerprintSeesEverythingThatMatters) {
@@ -158,6 +303,7 @@ TEST_F(PrecomputeImage, FingerprintSeesEverythingThatMatters) {
       [&] { options_.trace.spp = 5; },
       [&] { options_.trace.adaptive = false; },
       [&] { options_.error = 0.011; },
+      [&] { options_.max_bytes = 1 << 30; },
   };
   std::string last = first;
   for (std::size_t i = 0; i < changes.size(); ++i) {
