@@ -10,8 +10,10 @@
 #include <string>
 #include <vector>
 
+#include "apps/completeness.h"
 #include "apps/option_parsers.h"
 #include "apps/verbs.h"
+#include "precompute/scene_files.h"
 #include "prt/transport.h"
 
 namespace haarlight {
@@ -40,6 +42,25 @@ ColumnSizes column_sizes(const Transport& transport) {
 Json parse_meta(const std::string& meta) {
   Json parsed = Json::parse(meta, nullptr, false);
   return parsed.is_object() ? parsed : Json::object();
+}
+
+/// "unchanged", "changed", "not found" or "not known": whether the scene beside the file is still
+/// the one that it was made from.
+std::string scene_state_of(const std::filesystem::path& file, const Json& made) {
+  const auto text = [&](const char* key) {
+    return made.contains(key) && made[key].is_string() ? made[key].get<std::string>()
+                                                       : std::string();
+  };
+  if (text("scene_path").empty() || text("scene_hash").empty()) return "not known";
+  switch (scene_state(file, text("scene_path"), text("scene_hash"))) {
+    case SceneState::same:
+      return "unchanged";
+    case SceneState::changed:
+      return "changed";
+    case SceneState::not_found:
+      break;
+  }
+  return "not found";
 }
 
 Json describe(const std::filesystem::path& file, const Transport& transport) {
@@ -90,6 +111,8 @@ Json describe(const std::filesystem::path& file, const Transport& transport) {
                          {"mean", columns.mean},
                          {"max", columns.most}};
   out["bands"] = bands;
+  out["complete"] = incomplete_note(info.meta).empty();
+  out["scene"] = scene_state_of(file, parse_meta(info.meta));
   out["checksums"] = "verified";  // Transport::open throws when one is wrong
   out["made"] = parse_meta(info.meta);
   return out;
@@ -140,6 +163,13 @@ void print_text(const Json& d) {
     line("measured error",
          fmt::format("{:.3g} of the picture, relative RMSE, worst of the built-in lightings",
                      d["made"]["measured_error"].get<double>()));
+  }
+  if (!d["complete"].get<bool>()) line("incomplete", incomplete_note(d["made"].dump()));
+  const std::string scene = d["scene"].get<std::string>();
+  if (scene == "changed") {
+    line("scene", "changed since: precompute again to have it shown as it is now");
+  } else if (scene != "not known") {
+    line("scene", scene == "unchanged" ? "unchanged since" : "not found beside the file");
   }
   line("checksums", "verified, every byte");
   for (const auto& [key, value] : d["made"].items()) {

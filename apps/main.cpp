@@ -94,6 +94,8 @@ int main(int argc, char** argv) {
                                                one_line(error.what()), verb));
   } catch (const haarlight::Error& error) {
     return fail(kStatedError, error.what());
+  } catch (const haarlight::SilentFailure&) {
+    return kStatedError;
   } catch (const std::bad_alloc&) {
     return fail(kStatedError, "not enough memory for this size, expected more or a smaller size");
   } catch (const std::exception& error) {

@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <chrono>
+#include <exception>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
 #include <tuple>
 
+#include "apps/mpi_distribution.h"
 #include "apps/option_parsers.h"
 #include "apps/outputs.h"
 #include "apps/progress_printer.h"
@@ -18,6 +20,7 @@
 #include "apps/verbs.h"
 #include "core/error.h"
 #include "precompute/default_stage.h"
+#include "precompute/distribution.h"
 #include "precompute/effects.h"
 #include "precompute/precompute_mesh.h"
 #include "precompute/scene_import.h"
@@ -37,6 +40,8 @@ struct PrecomputeCommand {
   void run();
 
  private:
+  void run_alone_or_together(Distribution* others);
+
   void print_mesh(const MeshReport& report) const;
 };
 
@@ -44,29 +49,47 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+// Only the leader of several processes speaks.
 void PrecomputeCommand::run() {
-  const auto begin = std::chrono::steady_clock::now();
-  // Long work must not end at a place that cannot be written.
-  require_writable_file(output);
-
-  Scene imported = import_scene(scene);
-  print_repairs(scene, imported.report);
-  if (view == View::scene && !imported.camera) {
-    throw Error(ErrorKind::missing,
-                fmt::format("{}: has no perspective camera, expected one for --view scene",
-                            scene.string()));
+  const std::unique_ptr<Distribution> others = start_distribution();
+  if (!others || others->leads()) {
+    run_alone_or_together(others.get());
+    return;
   }
-  stage.use_scene_camera = view != View::framing;
-  const Stage made = set_stage(imported, stage);
+  try {
+    run_alone_or_together(others.get());
+  } catch (const std::exception&) {
+    throw SilentFailure();
+  }
+}
 
+void PrecomputeCommand::run_alone_or_together(Distribution* others) {
+  const auto begin = std::chrono::steady_clock::now();
+  const bool speaks = !others || others->leads();
+  Scene imported;
+  Stage made;
+  together(others, [&] {
+    // Long work must not end at a place that cannot be written.
+    if (speaks) require_writable_file(output);
+    imported = import_scene(scene);
+    if (speaks) print_repairs(scene, imported.report);
+    if (view == View::scene && !imported.camera) {
+      throw Error(ErrorKind::missing,
+                  fmt::format("{}: has no perspective camera, expected one for --view scene",
+                              scene.string()));
+    }
+    stage.use_scene_camera = view != View::framing;
+    made = set_stage(imported, stage);
+  });
+  options.distribution = others;
   options.scene_file = scene;
   PrecomputeReport report;
   std::optional<MeshReport> mesh;
   {
     ProgressPrinter progress("precompute");
-    const Progress show = [&](double share) { return progress(share); };
+    const Progress show = [&](double share) { return !speaks || progress(share); };
     MeshOptions watched = options;
-    static_cast<RunOptions&>(watched) = watched_by(progress, options);
+    if (speaks) static_cast<RunOptions&>(watched) = watched_by(progress, options);
     if (watched.time_limit > 0) {  // importing counts
       watched.time_limit = std::max(0.05, watched.time_limit - seconds_since(begin));
     }
@@ -77,6 +100,7 @@ void PrecomputeCommand::run() {
       report = precompute_image(imported, made.camera, watched, output, show);
     }
   }
+  if (!speaks) return;
   fmt::print("{}: {}x{} pixels, {}{}\n", output.string(), stage.width, stage.height,
              made.camera_made ? "framing camera" : "camera of the scene",
              made.ground_added ? ", ground added" : "");

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -10,6 +11,7 @@
 #include <tuple>
 #include <vector>
 
+#include "apps/completeness.h"
 #include "apps/option_parsers.h"
 #include "apps/outputs.h"
 #include "apps/progress_printer.h"
@@ -134,6 +136,8 @@ void RelightCommand::run() const {
   const int frames = replayed ? static_cast<int>(replayed->frames.size()) : sequence.frames;
   const std::vector<int> saved = frames_to_save(frames);
   const Transport scene = Transport::open(transport);
+  const std::string note = incomplete_note(scene.info().meta);
+  if (!note.empty()) fmt::print(stderr, "{}: incomplete: {}\n", transport.string(), note);
   check_kind(scene);
   MotionRecording plain;
   plain.environments.push_back(env);

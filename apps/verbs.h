@@ -7,6 +7,10 @@
 
 namespace haarlight {
 
+/// Thrown by a process whose failure another one reports: the program ends with exit code 1 and
+/// says nothing.
+struct SilentFailure {};
+
 /// The work of a verb, its options parsed: throws Error, or CLI::ValidationError where options
 /// contradict each other.
 using Verb = std::function<void()>;

@@ -26,9 +26,9 @@ class Distribution {
   /// Called by all: the leader's bytes, everywhere.
   virtual std::vector<std::byte> broadcast(const std::vector<std::byte>& bytes) = 0;
 
-  /// Leader: answers requests until every other process was told that nothing is left. `next` gives
-  /// a tile or nothing, `take` gets packed records, `failed` the message of a process that gives
-  /// up; `idle` is called about every millisecond.
+  /// Leader: answers requests until every other process has left. `next` gives
+  /// a tile or nothing, `take` gets packed records, `failed` the message of a process that failed;
+  /// `idle` is called about every millisecond.
   virtual void serve(const std::function<std::optional<int>()>& next,
                      const std::function<void(std::vector<std::byte>)>& take,
                      const std::function<void(const std::string&)>& failed,
@@ -36,8 +36,8 @@ class Distribution {
 
   /// Others: hands in a finished record (empty: none) and asks for a tile. Thread-safe.
   virtual std::optional<int> exchange(const std::vector<std::byte>& record) = 0;
-  /// Others: tells the leader that this process gives up.
-  virtual void give_up(const std::string& message) = 0;
+  /// Others: the last word of a process, after its last exchange(): nothing, or what went wrong.
+  virtual void leave(const std::string& failure) = 0;
 };
 
 /// Runs `work` here and everywhere; if it threw anywhere, throws everywhere: the own error where

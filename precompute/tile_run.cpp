@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstring>
 #include <exception>
@@ -328,12 +329,15 @@ void Run::follow() {
   Distribution& others = *options_.distribution;
   std::mutex once;
   std::string failure;
+  std::atomic<bool> failed{false};  // ends the other threads of this process at their next tile
   parallel_for(report_.workers, [&](int) {
     try {
       const std::unique_ptr<TileSource::Worker> worker = source_.make_worker();
       TileRows rows;
       std::vector<std::byte> record;
-      while (const std::optional<int> tile = others.exchange(record)) {
+      while (!failed) {
+        const std::optional<int> tile = others.exchange(record);
+        if (!tile) break;
         Traced made =
             trace_tile(*worker, source_.layout(), *tile, outputs(*tile), report_.thresholds, rows);
         record = std::move(made.record);
@@ -343,13 +347,13 @@ void Run::follow() {
         worker->counts = {};
       }
     } catch (const std::exception& error) {
+      failed = true;
       const std::lock_guard lock(once);
       if (failure.empty()) failure = fmt::format("process {}: {}", others.rank(), error.what());
     }
   });
-  if (failure.empty()) return;
-  others.give_up(failure);
-  throw Error(ErrorKind::io, failure);
+  others.leave(failure);
+  if (!failure.empty()) throw Error(ErrorKind::io, failure);
 }
 
 // Whether a preview may take the place of what is there: nothing, or an earlier preview.

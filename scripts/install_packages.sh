@@ -9,7 +9,7 @@ set -euo pipefail
 # openimageio-tools: Debian's CMake files of OpenImageIO name its programs and do not load without.
 build=(g++ cmake ninja-build pkg-config libopenimageio-dev openimageio-tools libopenexr-dev
   libimath-dev libeigen3-dev libassimp-dev libembree-dev libtbb-dev libcli11-dev nlohmann-json3-dev
-  libspdlog-dev libfmt-dev libzstd-dev libxxhash-dev libglfw3-dev libepoxy-dev libimgui-dev
+  libspdlog-dev libfmt-dev libzstd-dev libxxhash-dev libopenmpi-dev openmpi-bin libglfw3-dev libepoxy-dev libimgui-dev
   libstb-dev fonts-dejavu-core)
 demo=(python3 python3-numpy python3-matplotlib)
 test=(python3 python3-numpy python3-matplotlib libgtest-dev librapidcheck-dev libbenchmark-dev

@@ -42,6 +42,7 @@ PLACES = [
     (r"assimp/", r"precompute/.*"),
     (r"GLFW/|imgui", r"viewer/.*"),
     (r"GL/|GLES|glad/|epoxy/", r"viewer/.*"),
+    (r"mpi\.h", r"apps/mpi_distribution\.cpp"),
     (r"CLI/", r"(apps|viewer|data_gen|examples)/.*"),
     (r"gtest/|gmock/|rapidcheck", r"$^"),
     (r"benchmark/", r"$^"),
