@@ -5,6 +5,7 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <spawn.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -33,14 +34,18 @@ using haarlight::write_bytes;
 struct ProgramResult {
   int code = -1;  ///< exit code; -1 when it was killed by a signal
   std::string out, err;
+  long peak_kib = 0;  ///< most memory that it had resident
 };
 
 /// A started program; `command` is relative to `folder`, which is its working folder.
 class Program {
  public:
-  Program(const std::vector<std::string>& arguments, const std::filesystem::path& folder)
+  /// `starter`: words before the program's own, as of mpirun.
+  Program(const std::vector<std::string>& arguments, const std::filesystem::path& folder,
+          const std::vector<std::string>& starter = {})
       : out_(folder / ".stdout"), err_(folder / ".stderr") {
-    std::vector<std::string> words{HAARLIGHT_PROGRAM};
+    std::vector<std::string> words = starter;
+    words.push_back(HAARLIGHT_PROGRAM);
     words.insert(words.end(), arguments.begin(), arguments.end());
     std::vector<char*> argv;
     for (std::string& word : words) argv.push_back(word.data());
@@ -57,29 +62,31 @@ class Program {
                                      O_WRONLY | O_CREAT | O_TRUNC, 0644);
     posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, err_.c_str(),
                                      O_WRONLY | O_CREAT | O_TRUNC, 0644);
-    const int error =
-        posix_spawn(&process_, HAARLIGHT_PROGRAM, &actions, nullptr, argv.data(), environ);
+    const int error = posix_spawn(&process_, argv[0], &actions, nullptr, argv.data(), environ);
     posix_spawn_file_actions_destroy(&actions);
     if (error != 0) throw std::runtime_error("cannot start " HAARLIGHT_PROGRAM);
   }
 
   bool running() {
-    if (!ended_) ended_ = ::waitpid(process_, &status_, WNOHANG) == process_;
+    if (!ended_) ended_ = ::wait4(process_, &status_, WNOHANG, &usage_) == process_;
     return !ended_;
   }
   void interrupt() { ::kill(process_, SIGINT); }
+  void kill() { ::kill(process_, SIGKILL); }
 
   ProgramResult wait() {
     while (!ended_) {
-      ended_ = ::waitpid(process_, &status_, 0) == process_ || errno != EINTR;
+      ended_ = ::wait4(process_, &status_, 0, &usage_) == process_ || errno != EINTR;
     }
-    return {WIFEXITED(status_) ? WEXITSTATUS(status_) : -1, read_bytes(out_), read_bytes(err_)};
+    return {WIFEXITED(status_) ? WEXITSTATUS(status_) : -1, read_bytes(out_), read_bytes(err_),
+            usage_.ru_maxrss};
   }
 
  private:
   std::filesystem::path out_, err_;
   pid_t process_ = -1;
   int status_ = 0;
+  rusage usage_{};
   bool ended_ = false;
 };
 
