@@ -9,8 +9,8 @@
 
 namespace haarlight {
 
-std::vector<int> choose_pilots(TileSource::Worker& worker, std::span<const std::uint32_t> order,
-                               int& seen_count) {
+std::vector<int> tiles_with_scene(TileSource::Worker& worker,
+                                  std::span<const std::uint32_t> order) {
   std::vector<int> seen;
   const int tiles = static_cast<int>(order.size() / kTileRows);
   for (int t = 0; t < tiles; ++t) {
@@ -18,6 +18,12 @@ std::vector<int> choose_pilots(TileSource::Worker& worker, std::span<const std::
       seen.push_back(t);
     }
   }
+  return seen;
+}
+
+std::vector<int> choose_pilots(TileSource::Worker& worker, std::span<const std::uint32_t> order,
+                               int& seen_count) {
+  const std::vector<int> seen = tiles_with_scene(worker, order);
   seen_count = static_cast<int>(seen.size());
   const std::size_t count = std::min<std::size_t>(kPilotTiles, seen.size());
   std::vector<int> pilots;

@@ -13,6 +13,9 @@ namespace haarlight {
 
 inline constexpr int kPilotTiles = 64;
 
+/// Numbers of all tiles that show the scene, by a glance at each.
+std::vector<int> tiles_with_scene(TileSource::Worker& worker, std::span<const std::uint32_t> order);
+
 /// Numbers of up to kPilotTiles tiles spread evenly over those that show the scene. `order` is the
 /// row order of all tiles; `seen` gets how many of them show the scene.
 std::vector<int> choose_pilots(TileSource::Worker& worker, std::span<const std::uint32_t> order,

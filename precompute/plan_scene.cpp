@@ -1,0 +1,33 @@
+// Plans for a scene: of a fixed view, or of its vertices.
+
+#include "precompute/plan_scene.h"
+
+#include "precompute/mesh_tiles.h"
+#include "precompute/picture_tiles.h"
+#include "precompute/precompute_mesh.h"
+#include "precompute/vertex_sampler.h"
+
+namespace haarlight {
+
+Plan plan_image(const Scene& scene, const Camera& camera, const PlanOptions& options) {
+  const Visibility visibility(scene);
+  const auto source = [&](const TraceOptions& trace) -> std::unique_ptr<TileSource> {
+    return std::make_unique<PictureTiles>(scene, visibility, camera, trace);
+  };
+  PlanOptions picture = options;
+  picture.vertices = false;
+  return make_plan(scene, source, image_row_order(camera.width, camera.height), picture);
+}
+
+Plan plan_mesh(const Scene& scene, const PlanOptions& options) {
+  const Visibility visibility(scene);
+  const VertexSampler sampler(scene, visibility);
+  const auto source = [&](const TraceOptions& trace) -> std::unique_ptr<TileSource> {
+    return std::make_unique<MeshTiles>(sampler, scene, visibility, trace);
+  };
+  PlanOptions vertices = options;
+  vertices.vertices = true;
+  return make_plan(scene, source, mesh_row_order(transport_mesh(scene)), vertices);
+}
+
+}  // namespace haarlight
