@@ -11,6 +11,7 @@
 #include "apps/verbs.h"
 #include "core/image_io.h"
 #include "core/image_metrics.h"
+#include "prt/transport_difference.h"
 
 namespace haarlight {
 namespace {
@@ -20,6 +21,10 @@ struct CompareCommand {
   bool json = false;
 
   void run() const {
+    if (picture.extension() == ".hlt" && reference.extension() == ".hlt") {
+      compare_transports();
+      return;
+    }
     const Image a = load_image(picture);
     const Image b = load_image(reference);
     const ImageDifference difference = compare_images(a, b);
@@ -27,6 +32,26 @@ struct CompareCommand {
       print_json(difference);
     } else {
       print_text(difference);
+    }
+  }
+
+  // Two transports of the same rows under each built-in lighting: relative RMS of all rows.
+  void compare_transports() const {
+    const TransportDifference d =
+        transport_difference(Transport::open(picture), Transport::open(reference));
+    if (json) {
+      nlohmann::ordered_json out;
+      out["transport"] = picture.string();
+      out["reference"] = reference.string();
+      out["relative_rmse"] = d.relative_rmse;
+      out["of_lightings"] = d.of_lightings;
+      fmt::print("{}\n", out.dump(2));
+      return;
+    }
+    fmt::print("relative rmse  {:.6g} (root mean square over {} built-in lightings)\n",
+               d.relative_rmse, d.of_lightings.size());
+    for (std::size_t l = 0; l < d.of_lightings.size(); ++l) {
+      fmt::print("  lighting {}   {:.6g}\n", l + 1, d.of_lightings[l]);
     }
   }
 
@@ -56,13 +81,18 @@ struct CompareCommand {
 
 Verb add_compare(CLI::App& verb) {
   auto command = std::make_shared<CompareCommand>();
-  add_path(verb, "A", command->picture, "FILE", "picture: EXR, HDR, PNG, ...")->required();
-  add_path(verb, "B", command->reference, "FILE", "reference picture of the same size")->required();
+  add_path(verb, "A", command->picture, "FILE", "picture: EXR, HDR, PNG, ...; or a transport")
+      ->required();
+  add_path(verb, "B", command->reference, "FILE",
+           "reference picture of the same size; or a transport of the same rows")
+      ->required();
   verb.add_flag("--json", command->json, "print JSON; the PSNR of equal pictures is null");
   verb.footer(
       "\nDifferences of linear values over all pixels and channels. Relative RMSE is RMSE over "
       "the\n"
-      "root mean square of B; PSNR is against B's largest value.\n\n"
+      "root mean square of B; PSNR is against B's largest value. Transports (.hlt) are compared "
+      "by\n"
+      "the pictures they give under the built-in lightings, without background.\n\n"
       "Example:\n  haarlight compare out/pbi/frame_0075.exr out/reference/frame_0075.exr");
   return [command] { command->run(); };
 }

@@ -63,6 +63,8 @@ int main(int argc, char** argv) {
     verbs[name] = {verb, add_options(*verb)};
     names.push_back(name);
   };
+  add("plan", "Says which effects a scene calls for, why, and what each costs",
+      haarlight::add_plan);
   add("precompute", "Traces a scene's transport for one view and writes it to a file",
       haarlight::add_precompute);
   add("relight", "Relights a transport file under a moving environment; pictures and metrics",

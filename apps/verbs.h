@@ -15,6 +15,7 @@ struct SilentFailure {};
 /// contradict each other.
 using Verb = std::function<void()>;
 
+Verb add_plan(CLI::App& verb);
 Verb add_precompute(CLI::App& verb);
 Verb add_relight(CLI::App& verb);
 Verb add_compare(CLI::App& verb);

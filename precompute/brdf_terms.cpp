@@ -4,6 +4,7 @@
 
 #include <Eigen/SVD>
 #include <cmath>
+#include <vector>
 
 #include "precompute/bsdf.h"
 #include "precompute/random.h"
@@ -22,20 +23,23 @@ int brdf_terms(const Material& material, double error) {
   hit.metallic = plain.metallic;
   hit.roughness = plain.roughness;
 
-  // Even directions about the normal, cosine distributed, so that each stands for the same power.
-  constexpr int kIn = 192, kOut = 96;
+  // Even directions about the normal, cosine distributed, so that each stands for the same power;
+  // light comes from their mirror images, so that narrow lobes are met.
+  constexpr int kDirections = 4 * kMostBrdfTerms;
   constexpr double kShift[4] = {0, 0, 0.5, 0.5};
-  const auto direction = [&](int i) {
+  std::vector<Vec3> direction;
+  for (int i = 0; i < kDirections; ++i) {
     const EvenPoint u = even_point(static_cast<std::uint64_t>(i), kShift);
-    return cosine_direction({0, 1, 0}, u.value[2], u.value[3]);
-  };
-  Eigen::MatrixXd samples(kIn, kOut);
-  for (int o = 0; o < kOut; ++o) {
-    hit.to_viewer = direction(o);
+    direction.push_back(cosine_direction({0, 1, 0}, u.value[2], u.value[3]));
+  }
+  Eigen::MatrixXd samples(kDirections, kDirections);
+  for (int o = 0; o < kDirections; ++o) {
+    hit.to_viewer = direction[static_cast<std::size_t>(o)];
     const Bsdf b = bsdf_at(scene, hit);
     if (b.is_specular()) return 0;
-    for (int i = 0; i < kIn; ++i) {
-      const Vec3 w = direction(1000 + i);
+    for (int i = 0; i < kDirections; ++i) {
+      const Vec3& d = direction[static_cast<std::size_t>(i)];
+      const Vec3 w{-d.x, d.y, -d.z};
       RgbD f = b.diffuse_out(b.to_viewer) * b.diffuse_in(w);
       if (b.has_lobe()) {
         const Bsdf::LobeValues v = b.lobe_values(w);
@@ -48,7 +52,7 @@ int brdf_terms(const Material& material, double error) {
   const double all = s.squaredNorm();
   double left = all;
   int k = 0;
-  while (k < s.size() && left > error * error * all) {
+  while (k <= kMostBrdfTerms && left > error * error * all) {
     left -= s[k] * s[k];
     ++k;
   }

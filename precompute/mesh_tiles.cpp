@@ -3,6 +3,7 @@
 #include "precompute/mesh_tiles.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace haarlight {
 namespace {
@@ -14,7 +15,12 @@ class MeshWorker : public TileSource::Worker {
 
   void trace(std::span<const std::uint32_t> outputs, TileRows& rows) override {
     sampler_.sample(outputs, receivers_);
-    tracer_.trace(receivers_, scratch_, rows, counts, &noise);
+    TileNoise here;
+    tracer_.trace(receivers_, scratch_, rows, counts, &here);
+    rows.noise_variance = here.variance;
+    rows.noise_energy = here.energy;
+    noise.add(here);
+    transform_seconds += std::exchange(scratch_.transform_seconds, 0.0);
   }
 
   bool shows_scene(std::span<const std::uint32_t> outputs) override {

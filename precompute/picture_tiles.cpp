@@ -2,6 +2,8 @@
 
 #include "precompute/picture_tiles.h"
 
+#include <utility>
+
 namespace haarlight {
 namespace {
 
@@ -15,6 +17,7 @@ class PictureWorker : public TileSource::Worker {
     rows.noise_variance = here.variance;
     rows.noise_energy = here.energy;
     noise.add(here);
+    transform_seconds += std::exchange(scratch_.transform_seconds, 0.0);
   }
 
   bool shows_scene(std::span<const std::uint32_t> outputs) override {

@@ -164,8 +164,7 @@ Plan make_plan(const Scene& scene, const SourceMaker& source, std::span<const st
     const Pictures shadowed = probe->pictures(direct), unshadowed = probe->pictures(open);
     const double blocked = 1 - shadowed.even_light() / unshadowed.even_light();
     const double error = whole->energy_error(shadowed, unshadowed);
-    Effects without = open;
-    candidates.push_back({"shadows", without, error, 0});
+    candidates.push_back({"shadows", direct, open, error, 0});
     candidates.back().row = add(
         "shadows", true, fmt::format("{} of the sky's light is blocked", percent(blocked)), error);
   }
@@ -208,7 +207,7 @@ Plan make_plan(const Scene& scene, const SourceMaker& source, std::span<const st
             bounce_errors.front());
     Effects without = possible;
     without.bounces = 0;
-    candidates.push_back({"interreflection", without, bounce_errors.front(), row});
+    candidates.push_back({"interreflection", possible, without, bounce_errors.front(), row});
   }
 
   const auto judge = [&](const std::string& effect, bool Effects::*member, bool can,
@@ -220,18 +219,20 @@ Plan make_plan(const Scene& scene, const SourceMaker& source, std::span<const st
     Effects without = possible;
     without.*member = false;
     const double error = error_of(without);
-    candidates.push_back({effect, without, error, add(effect, true, why, error)});
+    candidates.push_back({effect, possible, without, error, add(effect, true, why, error)});
   };
   judge("color", &Effects::color, possible.color,
         "colours do not factor out of all rows: three channels there",
         "one colour factors out: one channel, a third of the bytes");
-  judge("gloss", &Effects::gloss, possible.gloss,
-        fmt::format("{} of the surface; the glossiest material is worth K = {} terms",
-                    percent(facts.glossy_area),
-                    facts.glossiest < 0
+  const int terms = facts.glossiest < 0
                         ? 0
                         : brdf_terms(scene.material[static_cast<std::size_t>(facts.glossiest)],
-                                     std::max(options.error, 1e-3))),
+                                     std::max(options.error, 1e-3));
+  judge("gloss", &Effects::gloss, possible.gloss,
+        fmt::format("{} of the surface; seen from all sides the narrowest lobe is worth {}",
+                    percent(facts.glossy_area),
+                    terms > kMostBrdfTerms ? fmt::format("more than K = {} terms", kMostBrdfTerms)
+                                           : fmt::format("K = {} terms", terms)),
         "no material has a lobe");
   judge("specular", &Effects::specular, possible.specular,
         fmt::format("mirrors and glass are {} of the surface", percent(facts.specular_area)),
@@ -302,9 +303,10 @@ Plan make_plan(const Scene& scene, const SourceMaker& source, std::span<const st
     plan.seconds = mine.seconds;
     plan.bytes = mine.bytes;
     for (const Candidate& c : candidates) {
+      const Cost with = c.with == possible ? all : meter.of(c.with);
       const Cost without = c.without == plan.effects ? mine : meter.of(c.without);
-      plan.rows[c.row].seconds = all.seconds - without.seconds;
-      plan.rows[c.row].bytes = all.bytes - without.bytes;
+      plan.rows[c.row].seconds = with.seconds - without.seconds;
+      plan.rows[c.row].bytes = with.bytes - without.bytes;
     }
     plan.pilot_rays = meter.rays();
   }

@@ -33,6 +33,7 @@ std::string meta_json(const Scene& scene, const PrecomputeOptions& options,
                         {"paths", t.paths},
                         {"seed", t.seed}}},
                       {"effects", to_string(t.effects)}};
+  if (!options.plan.empty()) meta["plan"] = nlohmann::json::parse(options.plan);
   add_origin(meta, options, file, fingerprint);
   return meta.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }

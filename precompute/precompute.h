@@ -15,7 +15,8 @@ namespace haarlight {
 
 /// How a transport is made. Picture size and view are the camera's.
 struct PrecomputeOptions : RunOptions {
-  TraceOptions trace;  ///< resolution and rays; see precompute/tile_tracer.h
+  TraceOptions trace;  ///< effects, resolution and rays; see precompute/tile_tracer.h
+  std::string plan;    ///< JSON object that led to trace.effects, kept in the file; or empty
 };
 
 /// Traces the light that each pixel of `camera` gets from every direction and writes `file`:

@@ -37,6 +37,7 @@ std::string meta_json(const Scene& scene, const MeshOptions& options, const Mesh
                         {"spp", t.spp},
                         {"adaptive", t.adaptive},
                         {"error", options.error},
+                        {"indirect_face", t.indirect_face},
                         {"noise", t.noise},
                         {"paths", t.paths},
                         {"seed", t.seed},
@@ -44,6 +45,7 @@ std::string meta_json(const Scene& scene, const MeshOptions& options, const Mesh
                         {"max_vertices", options.max_vertices}}},
                       {"view_dependent_vertices", report.view_dependent},
                       {"effects", to_string(t.effects)}};
+  if (!options.plan.empty()) meta["plan"] = nlohmann::json::parse(options.plan);
   add_origin(meta, options, file, fingerprint);
   return meta.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 namespace haarlight {
@@ -20,12 +21,27 @@ std::uint32_t root(std::vector<std::uint32_t>& parent, std::uint32_t v) {
   return v;
 }
 
-// The first vertex at the same place, for each.
-std::vector<std::uint32_t> weld(const Scene& scene) {
+// Half the longest side of the box around a scene; 0 for none.
+double half_extent(const Scene& scene) {
+  constexpr double kMax = std::numeric_limits<double>::max();
+  Vec3 low{kMax, kMax, kMax}, high = -low;
+  for (const Vec3& p : scene.position) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+  return scene.position.empty() ? 0
+                                : 0.5 * std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+}
+
+// The first vertex at the same place to `grain`, for each.
+std::vector<std::uint32_t> weld(const Scene& scene, double grain) {
   const std::vector<Vec3>& p = scene.position;
   std::vector<std::uint32_t> order(p.size());
   std::iota(order.begin(), order.end(), 0u);
-  const auto key = [&](std::uint32_t v) { return std::array<double, 3>{p[v].x, p[v].y, p[v].z}; };
+  const auto key = [&](std::uint32_t v) {
+    return std::array<double, 3>{std::round(p[v].x / grain), std::round(p[v].y / grain),
+                                 std::round(p[v].z / grain)};
+  };
   std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
     return key(a) != key(b) ? key(a) < key(b) : a < b;
   });
@@ -45,7 +61,8 @@ struct Edge {
 }  // namespace
 
 SceneObjects find_objects(const Scene& scene) {
-  const std::vector<std::uint32_t> place = weld(scene);
+  const double grain = std::max(kFlat * half_extent(scene), std::numeric_limits<double>::min());
+  const std::vector<std::uint32_t> place = weld(scene, grain);
   std::vector<std::uint32_t> parent(scene.position.size());
   std::iota(parent.begin(), parent.end(), 0u);
   for (const Triangle& t : scene.triangle) {
@@ -108,8 +125,7 @@ SceneObjects find_objects(const Scene& scene) {
       const Vec3 normal = cross(scene.position[t.vertex[1]] - a, scene.position[t.vertex[2]] - a);
       const Vec3 far = scene.position[edges[i + 1].opposite] - a;
       const double above = dot(normal, far);
-      const double size = length(normal) * length(far);
-      if (std::abs(above) > kFlat * size) {
+      if (std::abs(above) > grain * length(normal)) {
         const int side = above > 0 ? 1 : -1;
         if (sign[object] == -side) objects.convex[object] = false;
         sign[object] = side;

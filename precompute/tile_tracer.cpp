@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <chrono>
 #include <cmath>
 
 #include "core/error.h"
@@ -231,6 +232,7 @@ void TileTracer::trace(const TileReceivers& receivers, Scratch& scratch, TileRow
     }
   }
 
+  const auto start = std::chrono::steady_clock::now();
   const std::size_t stored = tile.rgb_blocks == 0 ? 1 : 3;
   tile.values.assign(stored * kRows * size, 0.0f);
   for (std::size_t row = 0; row < kRows; ++row) {
@@ -241,6 +243,8 @@ void TileTracer::trace(const TileReceivers& receivers, Scratch& scratch, TileRow
                    std::span<float>(tile.values).subspan((c * kRows + row) * size, size));
     }
   }
+  scratch.transform_seconds +=
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 }  // namespace haarlight

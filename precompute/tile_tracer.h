@@ -31,9 +31,9 @@ struct TraceOptions {
   int indirect_face = 32;  ///< squares along an edge of a cube face in which the sky is seen by
                            ///< light that is reflected between surfaces; a power of two, at least
                            ///< 4; no more than face_size are used
-  double noise = 0.01;     ///< a tile's interreflection is traced until its picture is estimated to
+  double noise = 0.02;     ///< a tile's interreflection is traced until its picture is estimated to
                            ///< be as noisy as this, relative RMS, under the worst built-in lighting
-  int paths = 4096;        ///< or until it has so many paths of a kind, [1, 2^20]
+  int paths = 2048;        ///< or until it has so many paths of a kind, [1, 2^20]
   std::uint64_t seed = 0;  ///< of interreflection's paths
 };
 
@@ -58,6 +58,7 @@ class TileTracer {
     std::vector<Deposit> deposits;
     std::vector<std::vector<std::size_t>> of_row;
     std::unique_ptr<Interreflection::Scratch, void (*)(Interreflection::Scratch*)> paths;
+    double transform_seconds = 0;  ///< spent on wavelets by all calls
   };
 
   /// Rows of the pixels `outputs` (kTileRows entries: y * width + x, or kNoOutput), replacing what

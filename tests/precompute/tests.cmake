@@ -21,3 +21,5 @@ haarlight_test(precompute/transport_against_reference haarlight_reference haarli
 haarlight_test(precompute/precompute_mesh haarlight_precompute)
 haarlight_test(precompute/subdivide haarlight_precompute)
 haarlight_test(precompute/vertex_sampler haarlight_precompute)
+haarlight_test(precompute/plan haarlight_precompute)
+target_link_libraries(test_precompute_plan PRIVATE nlohmann_json::nlohmann_json)
