@@ -101,7 +101,8 @@ class CostMeter {
 // One switch of Effects, and what the materials have to do with it.
 struct Candidate {
   std::string effect;
-  Effects without;  // everything but it
+  Effects with;     // everything, or for shadows direct light alone
+  Effects without;  // the same but it
   double error = 0;
   std::size_t row = 0;  // of the plan
 };
