@@ -121,6 +121,21 @@ Json describe(const std::filesystem::path& file, const Transport& transport) {
 std::string mebibytes(double bytes) { return fmt::format("{:.2f} MiB", bytes / (1024.0 * 1024.0)); }
 std::string kibibytes(double bytes) { return fmt::format("{:.1f} KiB", bytes / 1024.0); }
 
+// Which effects are in, and what the plan said of each, if there was one.
+void print_effects(const Json& made) {
+  if (made.contains("effects") && made["effects"].is_string()) {
+    fmt::print("{:<22}{}\n", "effects", made["effects"].get<std::string>());
+  }
+  if (!made.contains("plan") || !made["plan"].is_object()) return;
+  for (const Json& row : made["plan"].value("rows", Json::array())) {
+    if (!row.is_object()) continue;
+    const std::string effect = row.value("effect", std::string());
+    const std::string why = row.value("why", std::string());
+    fmt::print("{:<22}{}: {}{}\n", "  plan", effect,
+               row.value("needed", false) ? "needed; " : "not needed; ", why);
+  }
+}
+
 void print_text(const Json& d) {
   const auto line = [](const std::string& name, const std::string& value) {
     fmt::print("{:<22}{}\n", name, value);
@@ -172,8 +187,10 @@ void print_text(const Json& d) {
     line("scene", scene == "unchanged" ? "unchanged since" : "not found beside the file");
   }
   line("checksums", "verified, every byte");
+  print_effects(d["made"]);
   for (const auto& [key, value] : d["made"].items()) {
-    if (key != "measured_error") line("made: " + key, value.dump());
+    if (key == "measured_error" || key == "effects" || key == "plan") continue;
+    line("made: " + key, value.dump());
   }
 }
 
