@@ -1,9 +1,10 @@
-// What the benchmarks run on: one transport, one environment, one scene, made before any case runs.
+// What the benchmarks run on: one transport, one environment, scenes, made before any case runs.
 
 #pragma once
 
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "core/rgb.h"
@@ -16,6 +17,9 @@ struct Inputs {
   std::optional<Transport> transport;
   std::optional<Scene> scene;
   std::vector<std::vector<Rgb>> targets;  ///< lighting of frames 0 to 99 of `rotate`
+  std::string light_scene;                ///< of data_gen/, for full light transport
+  int light_size = 0;                     ///< pixels along its square picture
+  int light_face = 0;                     ///< texels along a face of its lighting
 };
 
 /// Filled by main before the cases run.
@@ -25,5 +29,6 @@ void register_memory();
 void register_decide();
 void register_relight();
 void register_rays();
+void register_full_light();
 
 }  // namespace haarlight::bench

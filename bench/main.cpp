@@ -27,23 +27,31 @@ namespace {
 
 int run(const std::string& transport, const std::string& environment, const std::string& scene) {
   Inputs& in = inputs();
-  in.transport = Transport::open(transport);
-  const Environment light = load_environment(environment);
-  Motion motion({}, in.transport->layout(), light);
-  for (int frame = 0; frame < 100; ++frame) {
-    const auto target = motion.coefficients(frame);
-    in.targets.emplace_back(target.begin(), target.end());
+  if (!transport.empty()) {
+    in.transport = Transport::open(transport);
+    const Environment light = load_environment(environment);
+    Motion motion({}, in.transport->layout(), light);
+    for (int frame = 0; frame < 100; ++frame) {
+      const auto target = motion.coefficients(frame);
+      in.targets.emplace_back(target.begin(), target.end());
+    }
+    fmt::print("transport {}: {}x{}, {:.1f} MiB of columns; {} kernel\n", transport,
+               in.transport->width(), in.transport->height(),
+               static_cast<double>(in.transport->chunk_bytes()) / 1048576, apply_kernel_name());
+    register_memory();
+    register_decide();
+    register_relight();
   }
-  if (!scene.empty()) in.scene = import_scene(scene);
-
-  fmt::print("transport {}: {}x{}, {:.1f} MiB of columns; {} threads; {} kernel\n", transport,
-             in.transport->width(), in.transport->height(),
-             static_cast<double>(in.transport->chunk_bytes()) / 1048576, thread_count(),
-             apply_kernel_name());
-  register_memory();
-  register_decide();
-  register_relight();
-  if (in.scene) register_rays();
+  if (!scene.empty()) {
+    in.scene = import_scene(scene);
+    register_rays();
+  }
+  if (!in.light_scene.empty()) {
+    fmt::print("full light: {}, {}x{} pixels, faces of {}x{}\n", in.light_scene, in.light_size,
+               in.light_size, in.light_face, in.light_face);
+    register_full_light();
+  }
+  fmt::print("{} threads\n", thread_count());
   Collector collector;
   benchmark::RunSpecifiedBenchmarks(&collector);
   collector.print_summary();
@@ -67,11 +75,26 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Measures relighting and ray tracing, and prints ratios to the machine's own limits.\n"
       "All --benchmark_* flags of Google Benchmark work; --benchmark_filter=REGEX picks cases:\n"
-      "memory.read, decide.*, apply.*, frame.*, rays.*"};
+      "memory.read, decide.*, apply.*, frame.* (with --transport), rays.* (with --scene), light.*, "
+      "run.*"};
   std::string transport, environment, scene;
-  app.add_option("--transport", transport, "transport file (.hlt)")->required();
-  app.add_option("--env", environment, "environment, turned by `rotate`")->required();
+  CLI::Option* file = app.add_option("--transport", transport,
+                                     "transport file (.hlt); without it relighting is left out");
+  CLI::Option* light = app.add_option("--env", environment, "environment, turned by `rotate`");
+  file->needs(light);
+  light->needs(file);
   app.add_option("--scene", scene, "scene for the ray cases; without it they are left out");
+  haarlight::bench::Inputs& in = haarlight::bench::inputs();
+  in.light_scene = "cornell", in.light_size = 64, in.light_face = 64;
+  app.add_option("--light-scene", in.light_scene,
+                 "scene of haarlight-data for full light transport; empty: left out")
+      ->capture_default_str();
+  app.add_option("--light-size", in.light_size, "pixels along its picture")
+      ->capture_default_str()
+      ->check(CLI::Range(8, 4096));
+  app.add_option("--light-face", in.light_face, "texels along a face of its lighting")
+      ->capture_default_str()
+      ->check(CLI::IsMember({4, 8, 16, 32, 64, 128, 256}));
   CLI11_PARSE(app, count, arguments.data());
   try {
     return haarlight::bench::run(transport, environment, scene);

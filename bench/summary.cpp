@@ -18,11 +18,12 @@ void Collector::ReportRuns(const std::vector<Run>& runs) {
   }
 }
 
+const Collector::Case* Collector::find(const std::string& name) const {
+  const auto it = median_.find(name);
+  return it == median_.end() ? nullptr : &it->second;
+}
+
 void Collector::print_summary() const {
-  const auto find = [&](const std::string& name) -> const Case* {
-    const auto it = median_.find(name);
-    return it == median_.end() ? nullptr : &it->second;
-  };
   fmt::print("\nRatios (medians of this run)\n");
   const Case* read = find("memory.read");
   for (const char* name : {"apply.bi.k30", "apply.pbi.k30", "apply.nwa.k30", "apply.reference"}) {
@@ -67,13 +68,16 @@ void Collector::print_summary() const {
     const double bare = packets->counters.at("items_per_second");
     fmt::print("  visibility rays: {:.1f} M/s, {:.0f} % of bare packets at {:.1f} M/s", mine / 1e6,
                100 * mine / bare, bare / 1e6);
+    double most = bare;
     if (stream) {
+      most = std::max(most, stream->counters.at("items_per_second"));
       fmt::print(", {:.0f} % of a bare stream at {:.1f} M/s",
                  100 * mine / stream->counters.at("items_per_second"),
                  stream->counters.at("items_per_second") / 1e6);
     }
-    fmt::print("\n");
+    fmt::print(" (wanted 80 % or more: {})\n", mine >= 0.8 * most ? "met" : "MISSED");
   }
+  print_light();
 }
 
 }  // namespace haarlight::bench

@@ -22,6 +22,9 @@ class Collector : public benchmark::ConsoleReporter {
     double milliseconds = 0;  // wall time of an iteration, or of a frame where the case says so
     std::map<std::string, double> counters;
   };
+  const Case* find(const std::string& name) const;
+  void print_light() const;  // bench/summary_light.cpp
+
   std::map<std::string, Case> median_;
 };
 

@@ -1,0 +1,4 @@
+find_package(Python3 REQUIRED COMPONENTS Interpreter)
+add_test(NAME Bench.EffectsAreJudgedRightly
+  COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_LIST_DIR}/effects_test.py)
+set_tests_properties(Bench.EffectsAreJudgedRightly PROPERTIES LABELS bench TIMEOUT 60)
