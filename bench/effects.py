@@ -5,7 +5,7 @@
 
 For each scene: `haarlight plan`, then `haarlight precompute` with every effect, without each in turn
 and with --effects auto; transports are compared by `haarlight compare`. Prints a Markdown table and
-writes it to OUT_DIR/effects.md and effects.csv. What OUT_DIR holds from the same options is kept, so
+writes it to OUT_DIR/effects.md, effects.csv and auto.csv. What OUT_DIR holds from the same options is kept, so
 the command can be stopped and given again; start in an empty folder when the program has changed.
 Scenes are those of haarlight-data; --scenes takes names and files.
 """
@@ -191,7 +191,7 @@ class Scene:
                 row["seconds"], row["bytes"])
         if impossible:
             without = self.transport("no_others", all_but(*impossible), fine)
-            add(" ".join(impossible), sum(estimate[e]["error"] for e in impossible),
+            add(", ".join(impossible), sum(estimate[e]["error"] for e in impossible),
                 rms(self.of_lightings(without, whole)),
                 math.hypot(whole["floor"], without["floor"]), whole["seconds"] - without["seconds"],
                 whole["bytes"] - without["bytes"], 0, 0)
@@ -252,18 +252,19 @@ def effects_table(rows):
 
 
 def auto_table(summaries, error):
-    yield f"| scene | `--effects auto --error {error}` | error against all: est. / meas. | within? |" \
-          " time: auto | all | saved | bytes: auto | all | saved |"
-    yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
+    yield (f"| scene | `--effects auto --error {error}` | error against all: est. / meas. | within? |"
+           " against all, finely stored | time (est. / meas.): auto | all | saved |"
+           " bytes (est. / meas.): auto | all | saved |")
+    yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
     for s in summaries:
         def cost(what, form):
             return [pair(s[f"estimated {kind} {what}"], s[f"{kind} {what}"], form,
                          judge_cost(s[f"estimated {kind} {what}"], s[f"{kind} {what}"], 0))
                     for kind in ("auto", "all")] + [
-                        f"{100 * (1 - s['auto ' + what] / s['all ' + what]):.0f} %"]
+                        f"{100 * (1 - s['auto ' + what] / s['all ' + what]):.0f} %".replace("-0 %", "0 %")]
         cells = [s["scene"], s["effects"].replace(",", ", "),
                  f"{percent(s['estimated error'])} / {percent(s['measured error'])}",
-                 "yes" if s["within"] else "**NO**", *cost("s", seconds_text), *cost("bytes", mib)]
+                 "yes" if s["within"] else "**NO**", percent(s["against fine"]), *cost("s", seconds_text), *cost("bytes", mib)]
         yield "| " + " | ".join(cells) + " |"
 
 
@@ -302,6 +303,10 @@ def write_results(out, rows, summaries, error):
         writer = csv.DictWriter(f, COLUMNS)
         writer.writeheader()
         writer.writerows(rows)
+    with open(os.path.join(out, "auto.csv"), "w", newline="") as f:
+        writer = csv.DictWriter(f, list(summaries[0]))
+        writer.writeheader()
+        writer.writerows(summaries)
     return text
 
 

@@ -66,7 +66,7 @@ class Keeping(unittest.TestCase):
                "measured s": 8, "seconds": "within", "estimated bytes": 50, "measured bytes": 10,
                "bytes": "OUTSIDE"}
         summary = {"scene": "box", "effects": "shadows", "estimated error": 0, "measured error": 0.02,
-                   "within": False}
+                   "within": False, "against fine": 0.03}
         for what in ("s", "bytes"):
             summary |= {f"auto {what}": 10, f"estimated auto {what}": 10, f"all {what}": 20,
                         f"estimated all {what}": 90}
