@@ -6,6 +6,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <optional>
 
 #include "precompute/random.h"
 #include "precompute/row_products.h"
@@ -21,6 +22,8 @@ constexpr std::size_t kOut = 3 * kRows;  // channel * kRows + row
 constexpr int kSubBatches = 4;           // of a batch; their spread is the noise
 constexpr int kFollowOneIn = 4;          // of a vertex' directions that mirrors or glass block
 constexpr std::int32_t kShared = -1;
+constexpr double kWideLobe = 0.3;    // half width, radians
+constexpr double kNearlySame = 0.1;  // directions for which a wide lobe is one, radians
 
 enum Part : unsigned { kDiffuse = 1, kLobe = 2, kDelta = 4, kAllParts = 7 };
 
@@ -38,6 +41,19 @@ Vec3 vec(float x, float y, float z) {
 RgbD lobe_color(const Bsdf& b, const Vec3& w) {
   const Bsdf::LobeValues v = b.lobe_values(w);
   return v.first * b.gloss_first + v.second * b.gloss_second;
+}
+
+// A receiver's lobe wide enough to be served by the paths of all.
+bool shares_lobe(const Bsdf& b) { return b.has_lobe() && b.lobe_half_width() >= kWideLobe; }
+
+// What a receiver sends to the viewer of light from `w`, by diffuse reflection and a wide lobe,
+// over (n.w) / pi: the weight of a direction drawn by the cosine.
+RgbD over_cosine(const Bsdf& b, const Vec3& w) {
+  RgbD f = b.diffuse_out(b.to_viewer) * coat_in(b, w);
+  if (!shares_lobe(b)) return f;
+  const double cosine = dot(b.normal, w);
+  if (cosine > 0) f += lobe_color(b, w) * (kPi / cosine);
+  return f;
 }
 
 double delta_luminance(const Bsdf& b) {
@@ -144,8 +160,10 @@ class Interreflection::Batch {
     s_.packets.assign((tile.receivers.size() + 7) / 8, ReceiverPacket{});
     for (std::size_t i = 0; i < tile.receivers.size(); ++i) {
       const Receiver& r = tile.receivers[i];
-      s_.diffuse.add(luminance(r.weight * r.bsdf.diffuse_albedo()));
-      s_.lobe.add(o_.effects_.gloss ? luminance(r.weight * r.bsdf.lobe_albedo()) : 0);
+      const bool wide = shares_lobe(r.bsdf);
+      const RgbD lobe = r.bsdf.has_lobe() ? r.bsdf.lobe_albedo() : RgbD{};
+      s_.diffuse.add(luminance(r.weight * (r.bsdf.diffuse_albedo() + (wide ? lobe : RgbD{}))));
+      s_.lobe.add(wide ? 0 : luminance(r.weight * lobe));
       const Vec3 at = origin(r);
       ReceiverPacket& p = s_.packets[i / 8];
       p.x[i % 8] = static_cast<float>(at.x), p.y[i % 8] = static_cast<float>(at.y);
@@ -288,8 +306,7 @@ class Interreflection::Batch {
     const bool specular = b.is_specular();
     apply_effects(o_.effects_, b);
     // f cos / (q p) of this receiver alone.
-    const RgbD alone =
-        r.weight * r.bsdf.diffuse_out(r.bsdf.to_viewer) * (coat_in(r.bsdf, w) / s_.diffuse.of(l));
+    const RgbD alone = r.weight * over_cosine(r.bsdf, w) * (1 / s_.diffuse.of(l));
     const auto row = static_cast<std::int32_t>(r.row);
     if (specular) {
       if (b.delta_count == 0) return;
@@ -308,8 +325,17 @@ class Interreflection::Batch {
       s_.paths.back().base = base;
       walk(path, *hit, b, kDiffuse, {1, 1, 1}, 1, false, random);
     }
-    if (b.has_lobe() || b.delta_count > 0) {
-      walk(new_path(row, alone), *hit, b, kLobe | kDelta, {1, 1, 1}, 1, false, random);
+    unsigned rest = kLobe | kDelta;
+    if (shares_lobe(b)) {
+      if (const auto base = connect_lobe(*hit, b, l)) {
+        const std::int32_t path = new_path(kShared, {});
+        s_.paths.back().base = *base;
+        walk(path, *hit, b, kLobe, {1, 1, 1}, 1, false, random);
+        rest = kDelta;
+      }
+    }
+    if ((b.has_lobe() && (rest & kLobe) != 0) || b.delta_count > 0) {
+      walk(new_path(row, alone), *hit, b, rest, {1, 1, 1}, 1, false, random);
     }
   }
 
@@ -349,6 +375,52 @@ class Interreflection::Batch {
   std::size_t connect(const SurfaceHit& y, const Bsdf& b, std::size_t finder) {
     const std::size_t at = s_.bases.size();
     s_.bases.resize(at + kOut, 0.0f);
+    const double density = look_back(y, b, finder);
+    if (!(density > 0)) return at;  // grazing to rounding
+    for (std::size_t l = 0; l < tile_.receivers.size(); ++l) {
+      if (!(seen_[l].geometry > 0)) continue;
+      add_weight(at, l, b.diffuse_out(seen_[l].towards) * (seen_[l].geometry / kPi / density));
+    }
+    return at;
+  }
+
+  // The same for what y sends by a wide lobe, to receivers that y sees within kNearlySame of the
+  // finder: they get what it would get. Whoever is that near to a receiver may serve it, so the
+  // density is summed over those.
+  std::optional<std::size_t> connect_lobe(const SurfaceHit& y, const Bsdf& b, std::size_t finder) {
+    look_back(y, b, finder);
+    if (!(seen_[finder].geometry > 0)) return std::nullopt;
+    const double least = std::cos(kNearlySame);
+    const std::size_t count = tile_.receivers.size(), at = s_.bases.size();
+    s_.bases.resize(at + kOut, 0.0f);
+    for (std::size_t l = 0; l < count; ++l) {
+      const Seen& here = seen_[l];
+      if (!(here.geometry > 0) || dot(here.towards, seen_[finder].towards) < least) continue;
+      double density = 0;
+      for (std::size_t f = 0; f < count; ++f) {
+        if (seen_[f].geometry > 0 && dot(here.towards, seen_[f].towards) >= least) {
+          density += s_.diffuse.of(f) * seen_[f].geometry / kPi;
+        }
+      }
+      const double share = here.geometry / kPi / density;
+      add_weight(at, l, {share, share, share});
+    }
+    return at;
+  }
+
+  // Adds what receiver l sends on of `value` from where seen_[l] says to its row's weight.
+  void add_weight(std::size_t base, std::size_t l, const RgbD& value) {
+    const Receiver& r = tile_.receivers[l];
+    const RgbD weight = r.weight * over_cosine(r.bsdf, -seen_[l].towards) * value;
+    float* to = s_.bases.data() + base + r.row;
+    to[0] += static_cast<float>(weight.r);
+    to[kRows] += static_cast<float>(weight.g);
+    to[2 * kRows] += static_cast<float>(weight.b);
+  }
+
+  // Fills seen_ with the receivers that y sees, and returns the density per area with which they
+  // find y.
+  double look_back(const SurfaceHit& y, const Bsdf& b, std::size_t finder) {
     const Vec3 from = y.position + Visibility::kSurfaceOffset * y.geometric_normal;
     const std::array<float, 3> start{static_cast<float>(from.x), static_cast<float>(from.y),
                                      static_cast<float>(from.z)};
@@ -387,19 +459,7 @@ class Interreflection::Batch {
         density += s_.diffuse.of(8 * p + i) * seen_[8 * p + i].geometry / kPi;
       }
     }
-    if (!(density > 0)) return at;  // grazing to rounding
-    for (std::size_t l = 0; l < count; ++l) {
-      if (!(seen_[l].geometry > 0)) continue;
-      const Receiver& r = tile_.receivers[l];
-      const double f = seen_[l].geometry / kPi * coat_in(r.bsdf, -seen_[l].towards) / density;
-      const RgbD weight =
-          r.weight * r.bsdf.diffuse_out(r.bsdf.to_viewer) * b.diffuse_out(seen_[l].towards) * f;
-      float* base = s_.bases.data() + at + r.row;
-      base[0] += static_cast<float>(weight.r);
-      base[kRows] += static_cast<float>(weight.g);
-      base[2 * kRows] += static_cast<float>(weight.b);
-    }
-    return at;
+    return density;
   }
 
   // From vertex y, number `bounce` of the path, along the path. `parts` of y's BSDF count. Shared

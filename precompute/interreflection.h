@@ -8,7 +8,10 @@
 //     c(x) = f(x <- y) G(x, y) V(x, y) / (N sum over receivers x' of q(x') p(x' -> y)),
 // p the density with which x' would have found y, q the chance that x' was asked: unbiased, and
 // each receiver profits from the paths of all (Veach 1997, section 9.2; Bekaert and others 2002 for
-// the sharing). Lobes and single directions on the way serve the receiver they started from only.
+// the sharing). Wide lobes (half
+// width above 0.3) of receivers are served with their diffuse part; wide lobes of y serve receivers
+// in nearly the finder's direction (0.1), as if it were the same. Narrow lobes and single
+// directions serve the receiver they started from only.
 //
 // Light that has been reflected depends on its first direction more smoothly than direct light: it
 // is a mean over all the places where it may have met the scene. So vertices look at the sky in

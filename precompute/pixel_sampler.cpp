@@ -36,7 +36,7 @@ PixelSampler::PixelSampler(const Scene& scene, const Visibility& visibility, con
       camera_(camera),
       effects_(effects),
       eye_(visibility.to_local(camera.position)),
-      side_(static_cast<int>(std::lround(std::sqrt(samples)))),
+      places_(samples > 1 ? texel_places(samples) : std::vector<TexelPlace>{{0.5, 0.5}}),
       pixel_width_(2 * std::tan(0.5 * camera.vertical_fov) / camera.height) {}
 
 bool PixelSampler::shoot(double px, double py, Seen& seen, RayCounts& counts) const {
@@ -126,27 +126,15 @@ double PixelSampler::sample(int x, int y, std::uint32_t row, TileReceivers& tile
   int count = 0;
   std::size_t nearest = 0;
   double nearest_off = 1e9;
-  // Looks through side x side places, jittered by numbers from `first` on.
-  const auto look = [&](int side, std::uint64_t first) {
-    count = 0;
-    for (int s = 0; s < side * side; ++s) {
-      const std::uint64_t counter = pixel * 64 + first + static_cast<std::uint64_t>(2 * s);
-      const double px = (s % side + unit_number(mix_bits(0, counter))) / side;
-      const double py = (s / side + unit_number(mix_bits(0, counter + 1))) / side;
-      Seen& one = seen[static_cast<std::size_t>(count)];
-      if (!shoot(x + px, y + py, one, counts)) continue;
-      const double off = (px - 0.5) * (px - 0.5) + (py - 0.5) * (py - 0.5);
-      if (off < nearest_off) nearest_off = off, nearest = static_cast<std::size_t>(count);
-      ++count;
-    }
-  };
-  if (side_ == 1) {
-    count = shoot(x + 0.5, y + 0.5, seen[0], counts) ? 1 : 0;
-  } else {
-    look(side_, 0);
+  for (const TexelPlace& place : places_) {
+    Seen& one = seen[static_cast<std::size_t>(count)];
+    if (!shoot(x + place.u, y + place.v, one, counts)) continue;
+    const double off = (place.u - 0.5) * (place.u - 0.5) + (place.v - 0.5) * (place.v - 0.5);
+    if (off < nearest_off) nearest_off = off, nearest = static_cast<std::size_t>(count);
+    ++count;
   }
   if (count == 0) return 0;
-  const double share = 1.0 / (side_ * side_);
+  const double share = 1.0 / static_cast<double>(places_.size());
   const auto end = seen.begin() + count;
 
   const bool through =
@@ -154,7 +142,7 @@ double PixelSampler::sample(int x, int y, std::uint32_t row, TileReceivers& tile
   if (through && effects_.specular) {
     constexpr int kSide = 4;
     const std::uint64_t key = mix_bits(1, pixel);
-    if (side_ == 1) {
+    if (places_.size() == 1) {
       look_through(seen[0], 1, 1, key, row, tile, counts);
       return 1;
     }
@@ -183,7 +171,7 @@ double PixelSampler::sample(int x, int y, std::uint32_t row, TileReceivers& tile
     const double off_plane = std::abs(dot(b.position - a.position, a.geometric_normal));
     return off_plane <= pixel_width_ * a.distance;
   };
-  if (count == 1 || !std::all_of(seen.begin(), end, similar)) {
+  if (places_.size() == 1 || !std::all_of(seen.begin(), end, similar)) {
     for (auto s = seen.begin(); s != end; ++s) add(*s, share, row, tile);
     return share * count;
   }

@@ -3,8 +3,10 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "core/camera.h"
+#include "precompute/direction_table.h"
 #include "precompute/effects.h"
 #include "precompute/point_tracer.h"
 #include "precompute/receiver.h"
@@ -13,9 +15,10 @@
 
 namespace haarlight {
 
-/// Finds what pixels see through `samples` stratified places each (1, 4 or 16), jittered by a hash
-/// of pixel and sample, through mirrors and glass where there are. Immutable, shared by all
-/// threads; keeps references.
+/// Finds what pixels see through `samples` places each (1, 4 or 16), through mirrors and glass
+/// where there are. The places are the same in every pixel, one in each column and row of as many,
+/// so that edges are even steps and neighbouring rows differ by what the scene does. Immutable,
+/// shared by all threads; keeps references.
 class PixelSampler {
  public:
   PixelSampler(const Scene& scene, const Visibility& visibility, const Camera& camera, int samples,
@@ -43,8 +46,8 @@ class PixelSampler {
   const Visibility& visibility_;
   Camera camera_;
   Effects effects_;
-  Vec3 eye_;            // local
-  int side_;            // samples on an axis
+  Vec3 eye_;  // local
+  std::vector<TexelPlace> places_;
   double pixel_width_;  // of a pixel at distance 1, in the middle of the picture
 };
 
