@@ -44,7 +44,7 @@ class Study:
         path = os.path.join(self.out, name + ".hlt")
         note = path + ".peak"
         if not os.path.exists(note):
-            run(self.haarlight, "precompute", self.bunny, "-o", path, *options)
+            run(self.haarlight, "precompute", self.bunny, "-o", path, "--effects", "shadows", *options)
             peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
             with open(note, "w") as f:
                 f.write(f"{peak:.0f}")
