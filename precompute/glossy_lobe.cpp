@@ -14,6 +14,9 @@ GlossyLobe::GlossyLobe(const DirectionTable& table, const Bsdf& bsdf) : table_(t
   } else {
     const double spacing = 2.0 / table.n / std::sqrt(static_cast<double>(table.samples));
     narrow_ = bsdf.lobe_half_width() < 2 * spacing;
+    // Over a texel 2 / n wide the midpoint is wrong by (2 / n)^2 / 24 times the second derivative,
+    // about one by the width squared: less than 0.1 % of the lobe from eight texels a width on.
+    wide_ = bsdf.lobe_half_width() > 8 * 2.0 / table.n;
   }
 }
 
@@ -35,6 +38,28 @@ void GlossyLobe::weights(std::size_t texel, std::span<float> first, std::span<fl
     first[s] = static_cast<float>(v.first) * d.solid_angle;
     second[s] = static_cast<float>(v.second) * d.solid_angle;
   }
+}
+
+Bsdf::LobeValues GlossyLobe::whole(std::size_t texel, std::span<float> first,
+                                   std::span<float> second) const {
+  Bsdf::LobeValues sum;
+  if (wide_) {
+    const auto samples = static_cast<std::size_t>(table_.samples);
+    double solid_angle = 0;
+    for (std::size_t s = 0; s < samples; ++s) {
+      solid_angle += static_cast<double>(table_.sample[texel * samples + s].solid_angle);
+    }
+    const DirectionTable::Sample& d = table_.sample[texel * samples];
+    sum = bsdf_.lobe_values(
+        {static_cast<double>(d.x), static_cast<double>(d.y), static_cast<double>(d.z)});
+    sum.first *= solid_angle;
+    sum.second *= solid_angle;
+    return sum;
+  }
+  weights(texel, first, second);
+  for (const float part : first) sum.first += static_cast<double>(part);
+  for (const float part : second) sum.second += static_cast<double>(part);
+  return sum;
 }
 
 }  // namespace haarlight

@@ -28,10 +28,13 @@ class GlossyLobe {
   /// entries.
   void weights(std::size_t texel, std::span<float> first, std::span<float> second) const;
 
+  /// Integrals over the whole texel. A GGX lobe many texels wide is evaluated once for it.
+  Bsdf::LobeValues whole(std::size_t texel, std::span<float> first, std::span<float> second) const;
+
  private:
   const DirectionTable& table_;
   const Bsdf& bsdf_;
-  bool narrow_ = false;
+  bool narrow_ = false, wide_ = false;
   std::optional<PhongLobe> phong_;
 };
 

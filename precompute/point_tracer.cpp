@@ -279,12 +279,9 @@ void PointTracer::trace(const ShadingPoint& point, const PointRow& row, PointScr
     for (std::uint64_t bits = sure; bits != 0; bits &= bits - 1) {
       const std::size_t k = 64 * w + static_cast<std::size_t>(std::countr_zero(bits));
       if (!lobe->reaches(k)) continue;
-      lobe->weights(k, scratch.first_weights, scratch.second_weights);
-      float first = 0, second = 0;
-      for (const float part : scratch.first_weights) first += part;
-      for (const float part : scratch.second_weights) second += part;
-      row.first[k] = first;
-      row.second[k] = second;
+      const Bsdf::LobeValues v = lobe->whole(k, scratch.first_weights, scratch.second_weights);
+      row.first[k] = static_cast<float>(v.first);
+      row.second[k] = static_cast<float>(v.second);
     }
   }
   refine(point, lobe ? &*lobe : nullptr, row, scratch, counts);
