@@ -66,7 +66,7 @@ class Keeping(unittest.TestCase):
                "measured s": 8, "seconds": "within", "estimated bytes": 50, "measured bytes": 10,
                "bytes": "OUTSIDE"}
         summary = {"scene": "box", "effects": "shadows", "estimated error": 0, "measured error": 0.02,
-                   "within": False, "against fine": 0.03}
+                   "within": False, "floor": 0.004, "against fine": 0.03}
         for what in ("s", "bytes"):
             summary |= {f"auto {what}": 10, f"estimated auto {what}": 10, f"all {what}": 20,
                         f"estimated all {what}": 90}
@@ -76,7 +76,8 @@ class Keeping(unittest.TestCase):
                      "- box, gloss: estimated 5.00 %, measured 1.00 %",
                      "Added bytes, where above 10 % of the whole: 1; outside a factor of 2: 1 (box",
                      "Added seconds, where above 10 % of the whole: 1; outside a factor of 2: 0.",
-                     "Whole runs, seconds: 2; outside a factor of 2: 1 (box all).", "NOT on box"):
+                     "Whole runs, seconds: 2; outside a factor of 2: 1 (box all).", "NOT on box (2.00 %, of which noise may be up to 0.40 %)",
+                     "more --paths are wanted: 0."):
             self.assertIn(line, text)
         self.assertEqual((Path(self.out) / "effects.csv").read_text().count("\n"), 2)
 
