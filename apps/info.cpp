@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "apps/completeness.h"
 #include "apps/option_parsers.h"
 #include "apps/verbs.h"
 #include "precompute/scene_files.h"
+#include "prt/completeness.h"
 #include "prt/transport.h"
 
 namespace haarlight {

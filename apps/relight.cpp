@@ -11,13 +11,13 @@
 #include <tuple>
 #include <vector>
 
-#include "apps/completeness.h"
 #include "apps/option_parsers.h"
 #include "apps/outputs.h"
 #include "apps/progress_printer.h"
 #include "apps/repairs.h"
 #include "apps/verbs.h"
 #include "core/image_io.h"
+#include "prt/completeness.h"
 #include "prt/image_relighter.h"
 #include "prt/metrics_csv.h"
 #include "prt/motion_background.h"

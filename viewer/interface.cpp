@@ -362,7 +362,11 @@ void Interface::draw(const ViewFrame& frame, const WindowTimes& times, double se
   browser_.draw(scale_);
 }
 
-void Interface::draw_controls(const ViewFrame& frame, const WindowTimes& times, float) {
+// On a window that is not high enough for all, the map gives way.
+void Interface::draw_controls(const ViewFrame& frame, const WindowTimes& times, float width) {
+  const ImGuiStyle& style = ImGui::GetStyle();
+  lights_width_ = width - 2 * style.WindowPadding.x;
+  lights_low_ = std::clamp(controls_height_ - ImGui::GetWindowHeight(), 0.0f, 0.3f * lights_width_);
   draw_file_row(frame);
   draw_numbers(frame, times);
   ImGui::Separator();
@@ -372,6 +376,8 @@ void Interface::draw_controls(const ViewFrame& frame, const WindowTimes& times, 
   draw_environment(frame);
   draw_display(frame);
   ImGui::PopItemWidth();
+  controls_height_ =
+      ImGui::GetCursorPosY() - style.ItemSpacing.y + style.WindowPadding.y + lights_low_;
 }
 
 void Interface::draw_file_row(const ViewFrame& frame) {
@@ -525,8 +531,10 @@ void Interface::draw_environment(const ViewFrame& frame) {
     settings_.background = std::max(0.0, static_cast<double>(background));
   }
   mark("background");
-  lights_.draw(frame, new_frame_, lights_exposure_, ImGui::GetContentRegionAvail().x,
-               static_cast<float>(scale_), settings_, [this](const char* name) { mark(name); });
+  lights_.draw(
+      frame, new_frame_, lights_exposure_,
+      {ImGui::GetContentRegionAvail().x, 0.5f * lights_width_ - lights_low_, lights_width_},
+      static_cast<float>(scale_), settings_, [this](const char* name) { mark(name); });
   ImGui::Separator();
 }
 

@@ -126,6 +126,8 @@ class Interface {
   History history_;
   LightPanel lights_;
   double lights_exposure_ = 0;
+  float lights_width_ = 0, lights_low_ = 0;  // without a scroll bar; what the map gives away
+  float controls_height_ = 0;                // of all controls, had the map its full height
   bool new_frame_ = false;
   std::shared_ptr<const OpenScene> seen_scene_;
 };

@@ -166,10 +166,10 @@ void LightPanel::draw_lamps(ViewSettings& settings, float scale,
   (void)scale;
 }
 
-void LightPanel::draw(const ViewFrame& frame, bool new_frame, double exposure_ev, float width,
-                      float scale, ViewSettings& settings,
+void LightPanel::draw(const ViewFrame& frame, bool new_frame, double exposure_ev,
+                      const LightPanelSize& size, float scale, ViewSettings& settings,
                       const std::function<void(const char*)>& mark) {
-  const float height = 0.5f * width;
+  const float width = size.width;
   const bool redraw =
       new_frame || exposure_ev != drawn_ev_ || unfolding_ != drawn_ || coverage_ != drawn_coverage_;
   if (frame.number > 0 && frame.lighting_filled && redraw) {
@@ -191,7 +191,7 @@ void LightPanel::draw(const ViewFrame& frame, bool new_frame, double exposure_ev
     drawn_coverage_ = coverage_;
   }
 
-  draw_map(width, height, scale, settings);
+  draw_map(width, size.map_height, scale, settings);
   mark("map");
   draw_lamps(settings, scale, mark);
 
@@ -200,9 +200,11 @@ void LightPanel::draw(const ViewFrame& frame, bool new_frame, double exposure_ev
   ImGui::SameLine(0.5f * width + 4 * scale);
   ImGui::TextDisabled("exact");
   const float half = 0.5f * width - 2 * scale;
-  const float high = unfolded_ ? half * static_cast<float>(unfolded_->height()) /
+  // Not of `half`: a scroll bar that comes must not change heights, or it would go again.
+  const float full = 0.5f * size.full_width - 2 * scale;
+  const float high = unfolded_ ? full * static_cast<float>(unfolded_->height()) /
                                      static_cast<float>(unfolded_->width())
-                               : 0.5f * half;
+                               : 0.5f * full;
   if (!shown_.empty()) {
     ImGui::Image(texture_id(shown_), {half, high});
     ImGui::SameLine(0, 4 * scale);

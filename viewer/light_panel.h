@@ -14,13 +14,20 @@
 
 namespace haarlight::viewer {
 
+/// Lengths in units of the pointer.
+struct LightPanelSize {
+  float width;       ///< to draw in
+  float map_height;  ///< of the map with the lamps
+  float full_width;  ///< `width` where there is no scroll bar
+};
+
 /// Needs a current context of OpenGL when it draws.
 class LightPanel {
  public:
-  /// Draws at the cursor of the current ImGui window, `width` wide. Takes lamps along in
-  /// `settings` as they are dragged. `mark` names what was drawn last.
-  void draw(const ViewFrame& frame, bool new_frame, double exposure_ev, float width, float scale,
-            ViewSettings& settings, const std::function<void(const char*)>& mark);
+  /// Draws at the cursor of the current ImGui window. Takes lamps along in `settings` as they are
+  /// dragged. `mark` names what was drawn last.
+  void draw(const ViewFrame& frame, bool new_frame, double exposure_ev, const LightPanelSize& size,
+            float scale, ViewSettings& settings, const std::function<void(const char*)>& mark);
 
  private:
   void draw_map(float width, float height, float scale, ViewSettings& settings);

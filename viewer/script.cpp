@@ -100,7 +100,9 @@ Interface::Area Script::area(const Line& line, const std::string& name,
   return found->second;
 }
 
-void Script::point(float x, float y, bool down) { pointer_ = {true, x, y, down, 0}; }
+void Script::point(float x, float y, bool down, int button) {
+  pointer_ = {true, x, y, down, button, 0};
+}
 
 // Puts what a line does into steps of a frame each.
 void Script::begin(const Line& line, Window& window, Interface& interface) {
@@ -143,8 +145,17 @@ void Script::begin(const Line& line, Window& window, Interface& interface) {
       steps_.emplace_back([this, x, y](Window&) { point(x, y, false); });
     }
     steps_.emplace_back([](Window&) {});
-  } else if (c == "drag") {
+  } else if (c == "wheel") {
+    if (line.words.size() != 2) fail(line, "expected CLICKS NAME");
+    const auto clicks = static_cast<float>(number(line, 0));
+    const Interface::Area a = area(line, line.words[1], interface);
+    const float x = a.x + 0.5f * a.width, y = a.y + 0.5f * a.height;
+    steps_.emplace_back([this, x, y](Window&) { point(x, y, false); });
+    steps_.emplace_back([this, clicks](Window&) { pointer_.scroll = clicks; });
+    steps_.emplace_back([this](Window&) { pointer_.scroll = 0; });
+  } else if (c == "drag" || c == "drag_right" || c == "drag_middle") {
     // drag X1 Y1 X2 Y2 NAME: from one place of a widget to another, in shares of its size.
+    const int button = c == "drag" ? 0 : c == "drag_right" ? 1 : 2;
     if (line.words.size() < 5) fail(line, "expected X1 Y1 X2 Y2 NAME");
     std::string name = line.words[4];
     for (std::size_t i = 5; i < line.words.size(); ++i) name += " " + line.words[i];
@@ -157,7 +168,8 @@ void Script::begin(const Line& line, Window& window, Interface& interface) {
     };
     const auto put = [&](double share, bool down) {
       const auto [x, y] = place(share);
-      steps_.emplace_back([this, x = x, y = y, down](Window&) { point(x, y, down); });
+      steps_.emplace_back(
+          [this, x = x, y = y, down, button](Window&) { point(x, y, down, button); });
     };
     put(0, false);
     for (int i = 0; i <= kDragSteps; ++i) put(static_cast<double>(i) / kDragSteps, true);
@@ -177,7 +189,8 @@ void Script::begin(const Line& line, Window& window, Interface& interface) {
     resting_ = true;
     since_ = Clock::now();
     rest_cpu_ = processor_seconds();
-  } else if (c == "shot" || c == "shot_picture" || c == "expect_message" || c == "expect_method") {
+  } else if (c == "shot" || c == "shot_picture" || c == "expect_message" || c == "expect_method" ||
+             c == "expect_inside") {
     rest_word();
     after_ = &line;
   } else if (c == "close") {
@@ -233,6 +246,15 @@ void Script::after_frame(Window& window, const Interface& interface, const Worke
   } else if (line.command == "expect_message") {
     if (interface.message().find(line.rest) == std::string::npos) {
       fail(line, fmt::format("the message is '{}'", interface.message()));
+    }
+  } else if (line.command == "expect_inside") {
+    const Interface::Area a = area(line, line.rest, interface);
+    int width = 0, height = 0;
+    window.framebuffer(width, height);
+    const double right = static_cast<double>(a.x + a.width) * window.pixel_ratio();
+    const double bottom = static_cast<double>(a.y + a.height) * window.pixel_ratio();
+    if (a.x < 0 || a.y < 0 || right > width || bottom > height) {
+      fail(line, fmt::format("it ends at {:.0f}, {:.0f} of {} x {}", right, bottom, width, height));
     }
   } else if (line.command == "expect_method") {
     const std::string method = lighting_method_name(worker.frame().metrics.method);

@@ -45,7 +45,7 @@ class Script {
 
   void begin(const Line& line, Window& window, Interface& interface);
   Interface::Area area(const Line& line, const std::string& name, const Interface& interface) const;
-  void point(float x, float y, bool down);
+  void point(float x, float y, bool down, int button = 0);
   [[noreturn]] void fail(const Line& line, const std::string& what) const;
   double number(const Line& line, std::size_t word) const;
 

@@ -42,6 +42,8 @@ class Session {
   const LightState& light() const { return light_; }
   /// What is relit with; null before a transport is open.
   const FrameRelighter* relighter() const { return relighter_ ? &*relighter_ : nullptr; }
+  /// Null before one is open.
+  const Transport* transport() const { return scene_ ? &scene_->transport : nullptr; }
   const MotionRecording& recording() const { return recording_; }
 
   /// The last frame's radiance with the light behind it. Requires a frame.

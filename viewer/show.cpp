@@ -11,6 +11,7 @@
 #include <chrono>
 #include <cmath>
 #include <optional>
+#include <thread>
 #include <vector>
 
 #include "core/error.h"
@@ -88,7 +89,7 @@ std::string show(const RunOptions& options, double scale) {
   interface.panels = remembered.panels;
   interface.plots = remembered.plots;
   interface.set_folder(remembered.folder);
-  Worker worker([] { glfwPostEmptyEvent(); });
+  Worker worker([] { glfwPostEmptyEvent(); }, {.frames = options.frames});
   open_first(options, remembered, interface);
   if (!options.record.empty()) interface.start_recording();
 
@@ -98,6 +99,7 @@ std::string show(const RunOptions& options, double scale) {
   std::uint64_t first_frame = 0;
   int due = kFramesAfterEvent;
   bool ended = false;
+  bool new_frame = false;  // taken and not drawn yet
   while (!ended && !glfwWindowShouldClose(window.handle()) && !interface.wants_quit()) {
     // Sleep until something happens.
     const bool scripted = script && !script->resting() && !script->done();
@@ -106,8 +108,10 @@ std::string show(const RunOptions& options, double scale) {
     } else {
       glfwWaitEventsTimeout(kSleep);
     }
-    const bool new_frame = worker.update();
+    new_frame |= worker.update();
     for (const Notice& notice : worker.take_notices()) {
+      // Nobody is there to open something else.
+      if (options.frames > 0 && notice.failed) throw Error(ErrorKind::format, notice.text);
       interface.note(notice);
       due = kFramesAfterEvent;
     }
@@ -177,9 +181,20 @@ std::string show(const RunOptions& options, double scale) {
       }
     }
     window.show();
+    new_frame = false;
   }
 
   if (table) table->commit();
+  if (!options.record.empty()) {
+    worker.act(StopRecording{options.record});
+    while (worker.busy()) {
+      worker.update();
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    for (const Notice& notice : worker.take_notices()) {
+      if (notice.failed) throw Error(ErrorKind::io, notice.text);
+    }
+  }
   if (!preferences.empty()) {
     Preferences now = remembered;
     glfwGetWindowSize(window.handle(), &now.width, &now.height);

@@ -30,6 +30,8 @@ class TripleBuffer {
     front_ = old & kIndex;
     return true;
   }
+  /// Whether the newest was not read yet. For either thread.
+  bool unread() const { return middle_.load(std::memory_order_acquire) & kFresh; }
   /// The reader's value; stays the same until update().
   const T& front() const { return values_[front_]; }
 

@@ -177,7 +177,9 @@ void Window::begin_frame(const ScriptedPointer& pointer) {
   if (pointer.active) {
     ImGuiIO& io = ImGui::GetIO();
     io.MousePos = {pointer.x, pointer.y};
-    io.MouseDown[0] = pointer.down;
+    for (int button = 0; button < 3; ++button) {
+      io.MouseDown[button] = pointer.down && button == pointer.button;
+    }
     io.MouseWheel += pointer.scroll;
   }
   ImGui::NewFrame();

@@ -17,6 +17,7 @@ struct ScriptedPointer {
   bool active = false;
   float x = 0, y = 0;
   bool down = false;
+  int button = 0;  ///< left, right, middle
   float scroll = 0;
 };
 

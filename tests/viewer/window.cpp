@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/image_io.h"
@@ -191,6 +193,83 @@ TEST_F(ViewWindow, RemembersTheWindowAndTheFiles) {
   ASSERT_EQ(again.code, 0) << again.err;
   EXPECT_EQ(load_image(folder_ / "again.png").width, 900);
   EXPECT_EQ(load_image(folder_ / "again.png").height, 640);
+}
+
+TEST_F(ViewWindow, GoesRoundAMesh) {
+  const std::string command =
+      "cd '" + folder_.path().string() +
+      "' && " HAARLIGHT_RELIGHT
+      " precompute table.obj -o mesh.hlt --vertices --face 8 >/dev/null 2>&1";
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  const ProgramResult result = show(
+      "settle\nshot_picture first.png\n"
+      "drag_right 0.3 0.5 0.6 0.5 picture\nsettle\nshot_picture round.png\n"
+      "drag_right 0.5 0.4 0.5 0.6 picture\nsettle\nshot_picture over.png\n"
+      "wheel 4 picture\nsettle\nshot_picture closer.png\n"
+      "drag_middle 0.5 0.5 0.7 0.5 picture\nsettle\nshot_picture moved.png\n"
+      "key 0\nsettle\nshot_picture back.png\nclose\n",
+      {"mesh.hlt", "--env", "room.exr", "--exposure", "0", "--motion", "still"});
+  ASSERT_EQ(result.code, 0) << result.err;
+  const auto seen = [&](const char* shot) { return boxes(load_image(folder_ / shot), 16, 12); };
+  const char* shots[] = {"first.png", "round.png", "over.png", "closer.png", "moved.png"};
+  for (int i = 1; i < 5; ++i) {
+    EXPECT_LT(correlation(seen(shots[i - 1]), seen(shots[i])), 0.99) << shots[i];
+  }
+  EXPECT_GT(correlation(seen("first.png"), seen("back.png")), 0.999);
+}
+
+TEST_F(ViewWindow, EveryControlIsInSightWithALampChosenAndTwoEnvironments) {
+  for (const auto& [size, scale] : {std::pair{"1280x800", "1"}, std::pair{"1560x1200", "1.5"}}) {
+    const ProgramResult result = show(
+        "settle\nclick add lamp\nsettle\nwait 5\nexpect_inside lamp radiance\n"
+        "expect_inside blend\nexpect_inside auto\nshot panel.png\nclose\n",
+        {"t.hlt", "--env", "room.exr", "--env-to", "grey.exr", "--motion", "still", "--size", size,
+         "--scale", scale});
+    EXPECT_EQ(result.code, 0) << size << ": " << result.err;
+  }
+}
+
+/// Of a metrics table: all but the times and what comes after them.
+std::vector<std::string> numbers_of(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  std::vector<std::string> rows;
+  for (std::string line; std::getline(stream, line);) {
+    std::size_t end = 0;
+    for (int column = 0; column < 7; ++column) end = line.find(',', end) + 1;
+    rows.push_back(line.substr(0, end));
+  }
+  return rows;
+}
+
+// More frames than the motion has, and a display slower than relighting.
+TEST_F(ViewWindow, CountedFramesAreThoseWithoutAWindow) {
+  const std::vector<std::string> what = {"t.hlt",  "--env",    "room.exr", "--motion",
+                                         "rotate", "--speed",  "4",        "--wavelets",
+                                         "40",     "--frames", "60"};
+  std::vector<std::string> words{"-a",           "-s",          "-screen 0 1600x1200x24",
+                                 HAARLIGHT_VIEW, "--no-memory", "--metrics",
+                                 "window.csv",   "--record",    "window.json"};
+  words.insert(words.end(), what.begin(), what.end());
+  const ProgramResult result = run_with_display(words, folder_.path());
+  ASSERT_EQ(result.code, 0) << result.err;
+  std::string command = "cd '" + folder_.path().string() +
+                        "' && " HAARLIGHT_VIEW " --headless --metrics headless.csv";
+  for (const std::string& word : what) command += " " + word;
+  ASSERT_EQ(std::system((command + " >/dev/null 2>&1").c_str()), 0);
+  const auto rows = numbers_of(folder_ / "window.csv");
+  EXPECT_EQ(rows.size(), 61u);
+  EXPECT_EQ(rows, numbers_of(folder_ / "headless.csv"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "window.json"));
+}
+
+TEST_F(ViewWindow, CountedFramesThatCannotBeMadeEndTheProgram) {
+  write_bytes(folder_ / "bad.hlt", "no transport");
+  const ProgramResult result =
+      run_with_display({"-a", "-s", "-screen 0 1600x1200x24", HAARLIGHT_VIEW, "--no-memory",
+                        "bad.hlt", "--env", "room.exr", "--frames", "5"},
+                       folder_.path());
+  EXPECT_EQ(result.code, 1);
+  EXPECT_NE(result.err.find("bad.hlt"), std::string::npos) << result.err;
 }
 
 TEST_F(ViewWindow, SaysWhichLineOfAScriptFailed) {

@@ -59,8 +59,8 @@ bool wait_for(const std::function<bool()>& condition) {
 struct Running {
   TemporaryFolder folder;
   std::atomic<int> wakes{0};
-  Worker worker{[this] { ++wakes; }, 1000};
-  Running() {
+  Worker worker;
+  explicit Running(int frames = 0) : worker{[this] { ++wakes; }, {1000, frames}} {
     fixtures::write_small_transport(folder / "t.hlt");
     fixtures::write_sky(folder / "a.exr", 1);
     worker.act(OpenTransport{folder / "t.hlt"});
@@ -76,9 +76,12 @@ TEST(Worker, ShowsTheSettingsItWasGivenLastAndRests) {
     settings.method = i % 2 ? LightingMethod::nwa : LightingMethod::pbi;
     r.worker.set(settings);
   }
-  ASSERT_TRUE(wait_for([&] { return r.worker.idle(); }));
-  while (r.worker.update()) {
-  }
+  // Its last frame is there before it says that it rests.
+  ASSERT_TRUE(wait_for([&] {
+    const bool idle = r.worker.idle();
+    r.worker.update();
+    return idle;
+  }));
   const ViewFrame& frame = r.worker.frame();
   EXPECT_TRUE(frame.converged);
   EXPECT_EQ(frame.light.rotation, rotation_y(2.0) * rotation_x(0));
@@ -112,11 +115,63 @@ TEST(Worker, TellsWhatFailedAndGoesOn) {
   EXPECT_TRUE(wait_for([&] { return r.worker.update(); }));
 }
 
+// A display slower than relighting sees every frame; one that is hidden does not hold them up.
+TEST(Worker, WaitsForTheDisplayButNotForEver) {
+  using Clock = std::chrono::steady_clock;
+  Running r;
+  ViewSettings settings;
+  settings.playing = true;
+  settings.method = LightingMethod::nwa;
+  r.worker.set(settings);
+  ASSERT_TRUE(wait_for([&] { return r.worker.update(); }));
+  int looked_at = 0;
+  Clock::time_point taken = Clock::now();
+  for (int i = 0; i < 20; ++i) {
+    const std::uint64_t before = r.worker.frame().number;
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    ASSERT_TRUE(wait_for([&] { return r.worker.update(); }));
+    const Clock::time_point now = Clock::now();
+    // Where this thread was held up itself, the worker was right to go on.
+    if (now - taken < std::chrono::milliseconds(200)) {
+      EXPECT_EQ(r.worker.frame().number, before + 1);
+      ++looked_at;
+    }
+    taken = now;
+  }
+  EXPECT_GT(looked_at, 0);
+  const std::uint64_t before = r.worker.frame().number;
+  std::this_thread::sleep_for(std::chrono::milliseconds(900));
+  ASSERT_TRUE(wait_for([&] { return r.worker.update(); }));
+  EXPECT_GT(r.worker.frame().number, before + 1);
+}
+
+// Frames that are counted are all handed over, at rest too, and their motion is in frames.
+TEST(Worker, MakesAsManyFramesAsItIsAskedFor) {
+  constexpr int kFrames = 40;
+  Running r(kFrames);
+  ViewSettings settings;
+  settings.playing = true;
+  settings.loop = false;
+  settings.speed = 10;
+  r.worker.set(settings);
+  for (std::uint64_t i = 1; i <= kFrames; ++i) {
+    ASSERT_TRUE(wait_for([&] { return r.worker.update(); })) << i;
+    ASSERT_EQ(r.worker.frame().number, i);
+    if (i == 2) std::this_thread::sleep_for(std::chrono::milliseconds(600));
+  }
+  EXPECT_TRUE(wait_for([&] { return r.worker.idle(); }));
+  EXPECT_FALSE(r.worker.update());
+  EXPECT_FALSE(r.worker.busy());
+}
+
 // Settings that no frame can be made with are told once, not sixty times a second.
 TEST(Worker, WaitsForSomethingElseAfterAFrameThatFailed) {
   Running r;
   ASSERT_TRUE(wait_for([&] { return r.worker.update() && r.worker.frame().number > 0; }));
-  ASSERT_TRUE(wait_for([&] { return r.worker.idle(); }));
+  ASSERT_TRUE(wait_for([&] {
+    r.worker.update();
+    return r.worker.idle();
+  }));
   r.worker.take_notices();
   ViewSettings settings;
   settings.wavelets = 0;

@@ -1,6 +1,6 @@
 // Whether a transport shows all that was asked for.
 
-#include "apps/completeness.h"
+#include "prt/completeness.h"
 
 #include <fmt/format.h>
 
