@@ -210,7 +210,12 @@ TEST_F(ViewWindow, GoesRoundAMesh) {
       "key 0\nsettle\nshot_picture back.png\nclose\n",
       {"mesh.hlt", "--env", "room.exr", "--exposure", "0", "--motion", "still"});
   ASSERT_EQ(result.code, 0) << result.err;
-  const auto seen = [&](const char* shot) { return boxes(load_image(folder_ / shot), 16, 12); };
+  // Without the lowest row of boxes, where messages come and go.
+  const auto seen = [&](const char* shot) {
+    auto all = boxes(load_image(folder_ / shot), 16, 12);
+    all.resize(all.size() - 3 * 16);
+    return all;
+  };
   const char* shots[] = {"first.png", "round.png", "over.png", "closer.png", "moved.png"};
   for (int i = 1; i < 5; ++i) {
     EXPECT_LT(correlation(seen(shots[i - 1]), seen(shots[i])), 0.99) << shots[i];
@@ -221,7 +226,7 @@ TEST_F(ViewWindow, GoesRoundAMesh) {
 TEST_F(ViewWindow, EveryControlIsInSightWithALampChosenAndTwoEnvironments) {
   for (const auto& [size, scale] : {std::pair{"1280x800", "1"}, std::pair{"1560x1200", "1.5"}}) {
     const ProgramResult result = show(
-        "settle\nclick add lamp\nsettle\nwait 5\nexpect_inside lamp radiance\n"
+        "settle\nwait 5\nclick add lamp\nsettle\nwait 5\nexpect_inside lamp radiance\n"
         "expect_inside blend\nexpect_inside auto\nshot panel.png\nclose\n",
         {"t.hlt", "--env", "room.exr", "--env-to", "grey.exr", "--motion", "still", "--size", size,
          "--scale", scale});
