@@ -319,15 +319,16 @@ class Interreflection::Batch {
            random);
       return;
     }
+    if (b.has_diffuse() || shares_lobe(b)) look_back(*hit, b, l);
     if (b.has_diffuse()) {
-      const std::size_t base = connect(*hit, b, l);
+      const std::size_t base = connect(b);
       const std::int32_t path = new_path(kShared, {});
       s_.paths.back().base = base;
       walk(path, *hit, b, kDiffuse, {1, 1, 1}, 1, false, random);
     }
     unsigned rest = kLobe | kDelta;
     if (shares_lobe(b)) {
-      if (const auto base = connect_lobe(*hit, b, l)) {
+      if (const auto base = connect_lobe(l)) {
         const std::int32_t path = new_path(kShared, {});
         s_.paths.back().base = *base;
         walk(path, *hit, b, kLobe, {1, 1, 1}, 1, false, random);
@@ -372,14 +373,13 @@ class Interreflection::Batch {
 
   // Weights of all rows for what y sends by diffuse reflection; y was found by receiver `finder`.
   // Returns where they are in bases.
-  std::size_t connect(const SurfaceHit& y, const Bsdf& b, std::size_t finder) {
+  std::size_t connect(const Bsdf& b) {
     const std::size_t at = s_.bases.size();
     s_.bases.resize(at + kOut, 0.0f);
-    const double density = look_back(y, b, finder);
-    if (!(density > 0)) return at;  // grazing to rounding
+    if (!(density_ > 0)) return at;  // grazing to rounding
     for (std::size_t l = 0; l < tile_.receivers.size(); ++l) {
       if (!(seen_[l].geometry > 0)) continue;
-      add_weight(at, l, b.diffuse_out(seen_[l].towards) * (seen_[l].geometry / kPi / density));
+      add_weight(at, l, b.diffuse_out(seen_[l].towards) * (seen_[l].geometry / kPi / density_));
     }
     return at;
   }
@@ -387,17 +387,21 @@ class Interreflection::Batch {
   // The same for what y sends by a wide lobe, to receivers that y sees within kNearlySame of the
   // finder: they get what it would get. Whoever is that near to a receiver may serve it, so the
   // density is summed over those.
-  std::optional<std::size_t> connect_lobe(const SurfaceHit& y, const Bsdf& b, std::size_t finder) {
-    look_back(y, b, finder);
+  std::optional<std::size_t> connect_lobe(std::size_t finder) {
     if (!(seen_[finder].geometry > 0)) return std::nullopt;
     const double least = std::cos(kNearlySame);
     const std::size_t count = tile_.receivers.size(), at = s_.bases.size();
     s_.bases.resize(at + kOut, 0.0f);
+    // Where all are within half the angle of the finder, all are near each other.
+    const double half = std::cos(0.5 * kNearlySame);
+    const bool all = std::all_of(seen_.begin(), seen_.end(), [&](const Seen& s) {
+      return !(s.geometry > 0) || dot(s.towards, seen_[finder].towards) >= half;
+    });
     for (std::size_t l = 0; l < count; ++l) {
       const Seen& here = seen_[l];
       if (!(here.geometry > 0) || dot(here.towards, seen_[finder].towards) < least) continue;
-      double density = 0;
-      for (std::size_t f = 0; f < count; ++f) {
+      double density = all ? density_ : 0;
+      for (std::size_t f = 0; f < (all ? 0 : count); ++f) {
         if (seen_[f].geometry > 0 && dot(here.towards, seen_[f].towards) >= least) {
           density += s_.diffuse.of(f) * seen_[f].geometry / kPi;
         }
@@ -410,17 +414,16 @@ class Interreflection::Batch {
 
   // Adds what receiver l sends on of `value` from where seen_[l] says to its row's weight.
   void add_weight(std::size_t base, std::size_t l, const RgbD& value) {
-    const Receiver& r = tile_.receivers[l];
-    const RgbD weight = r.weight * over_cosine(r.bsdf, -seen_[l].towards) * value;
-    float* to = s_.bases.data() + base + r.row;
+    const RgbD weight = seen_[l].onwards * value;
+    float* to = s_.bases.data() + base + tile_.receivers[l].row;
     to[0] += static_cast<float>(weight.r);
     to[kRows] += static_cast<float>(weight.g);
     to[2 * kRows] += static_cast<float>(weight.b);
   }
 
-  // Fills seen_ with the receivers that y sees, and returns the density per area with which they
-  // find y.
-  double look_back(const SurfaceHit& y, const Bsdf& b, std::size_t finder) {
+  // Fills seen_ with the receivers that y sees, and density_ with the density per area with which
+  // they find y.
+  void look_back(const SurfaceHit& y, const Bsdf& b, std::size_t finder) {
     const Vec3 from = y.position + Visibility::kSurfaceOffset * y.geometric_normal;
     const std::array<float, 3> start{static_cast<float>(from.x), static_cast<float>(from.y),
                                      static_cast<float>(from.z)};
@@ -444,7 +447,7 @@ class Interreflection::Batch {
         const double at_y = dot(o, b.geometric_normal);
         const double at_x = -dot(o, r.bsdf.normal);
         if (!(at_y > 0) || !(at_x > 0) || !(dot(o, r.bsdf.geometric_normal) < 0)) continue;
-        seen_[l] = {o, at_x * at_y / square};
+        seen_[l] = {o, at_x * at_y / square, {}};
         lanes |= 1u << i;
       }
       if (lanes == 0) continue;
@@ -456,10 +459,13 @@ class Interreflection::Batch {
           if (8 * p + i < count) seen_[8 * p + i].geometry = 0;
           continue;
         }
-        density += s_.diffuse.of(8 * p + i) * seen_[8 * p + i].geometry / kPi;
+        Seen& here = seen_[8 * p + i];
+        const Receiver& r = tile_.receivers[8 * p + i];
+        here.onwards = r.weight * over_cosine(r.bsdf, -here.towards);
+        density += s_.diffuse.of(8 * p + i) * here.geometry / kPi;
       }
     }
-    return density;
+    density_ = density;
   }
 
   // From vertex y, number `bounce` of the path, along the path. `parts` of y's BSDF count. Shared
@@ -661,12 +667,7 @@ class Interreflection::Batch {
       for (std::size_t l = 0; l < o_.lights_; ++l) {
         const float* light =
             o_.light_.data() + (static_cast<std::size_t>(phase) * o_.lights_ + l) * slots;
-        float parts[8] = {};
-        for (std::size_t j = 0; j < slots; j += 8) {
-          for (std::size_t i = 0; i < 8; ++i) parts[i] += light[j + i] * values[c * slots + j + i];
-        }
-        double sum = 0;
-        for (const float part : parts) sum += static_cast<double>(part);
+        const auto sum = static_cast<double>(dot_product(light, values + c * slots, slots));
         of.light[l] += s_.columns[first_column + c].tint * sum;
       }
     }
@@ -675,6 +676,7 @@ class Interreflection::Batch {
   struct Seen {
     Vec3 towards;         // from y to the receiver, unit
     double geometry = 0;  // both cosines by the squared distance; 0: not seen
+    RgbD onwards;         // what the receiver's row shows of light from y, over (n.w) / pi
   };
 
   const Interreflection& o_;
@@ -682,6 +684,7 @@ class Interreflection::Batch {
   Scratch& s_;
   RayCounts& counts_;
   std::vector<Seen> seen_;
+  double density_ = 0;
   double shift_[4], lobe_shift_[4];
   int sub_batch_ = 0;
   int phase_ = -1;  // of the path's first vertex, evenly spread over paths; -1: random
@@ -711,6 +714,10 @@ Interreflection::Interreflection(const Scene& scene, const Visibility& visibilit
       light_[(at / slots * lights_ + l) * slots + at % slots] += of[k] * directions_.share()[k];
     }
   }
+  for (std::size_t k = 0; k < texels; ++k) {
+    const auto at = static_cast<std::size_t>(directions_.square()[k]);
+    sum_at_.push_back(static_cast<std::uint32_t>(at / slots * kOut * slots + at % slots));
+  }
 }
 
 Interreflection::~Interreflection() = default;
@@ -726,13 +733,8 @@ void Interreflection::add(const TileReceivers& tile, const PathBudget& budget, S
   std::vector<double> direct(lights_ * kOut, 0.0);
   for (std::size_t m = 0; m < kOut; ++m) {
     for (std::size_t l = 0; l < lights_; ++l) {
-      const float* row = rows.data() + m * texels;
-      const float* light = light_texels_.data() + l * texels;
-      float parts[8] = {};
-      for (std::size_t k = 0; k + 8 <= texels; k += 8) {
-        for (std::size_t i = 0; i < 8; ++i) parts[i] += row[k + i] * light[k + i];
-      }
-      for (const float part : parts) direct[l * kOut + m] += static_cast<double>(part);
+      direct[l * kOut + m] = static_cast<double>(
+          dot_product(rows.data() + m * texels, light_texels_.data() + l * texels, texels));
     }
   }
 
@@ -765,13 +767,11 @@ void Interreflection::add(const TileReceivers& tile, const PathBudget& budget, S
   noise.add(own);
 
   const float share = 1.0f / static_cast<float>(done);
+  const float* share_of = directions_.share().data();
   for (std::size_t m = 0; m < kOut; ++m) {
     float* row = rows.data() + m * texels;
-    for (std::size_t k = 0; k < texels; ++k) {
-      const auto at = static_cast<std::size_t>(directions_.square()[k]);
-      row[k] +=
-          share * directions_.share()[k] * s.sums[(at / slots * kOut + m) * slots + at % slots];
-    }
+    const float* sums = s.sums.data() + m * slots;
+    for (std::size_t k = 0; k < texels; ++k) row[k] += share * share_of[k] * sums[sum_at_[k]];
     if (s.deposited.empty()) continue;
     for (std::size_t k = 0; k < texels; ++k) row[k] += share * s.deposited[m * texels + k];
   }

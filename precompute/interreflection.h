@@ -82,7 +82,8 @@ class Interreflection {
   std::uint64_t seed_;
   HaarLayout layout_;
   SparseDirections directions_;
-  double narrow_;  // lobes below this half width are sampled, radians
+  double narrow_;                      // lobes below this half width are sampled, radians
+  std::vector<std::uint32_t> sum_at_;  // per texel: where its square's sum is for row 0
   std::size_t lights_ = 0;
   std::vector<float> light_;         // [phase][light][slot]
   std::vector<float> light_texels_;  // [light][texel]

@@ -193,6 +193,8 @@ Plan make_plan(const Scene& scene, const SourceMaker& source, std::span<const st
     std::size_t enough = 0;
     while (bounce_errors[enough] > 0.5 * budget) ++enough;
     chosen.bounces = kBounceSteps[enough];
+    // Roulette makes far bounces nearly free; cutting them short saves time only if they are few.
+    if (chosen.bounces > 4) chosen.bounces = kMostBounces;
     std::string series;
     for (std::size_t i = 1; i < std::size(kBounceSteps) && kBounceSteps[i] <= 3; ++i) {
       series +=

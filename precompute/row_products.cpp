@@ -36,6 +36,17 @@ void product(const float* weight, const float* const* column, std::size_t count,
 
 }  // namespace
 
+HAARLIGHT_MULTIVERSION
+float dot_product(const float* a, const float* b, std::size_t length) {
+  Eight sum{};
+  for (std::size_t j = 0; j < length; j += 8) {
+    sum += *reinterpret_cast<const Eight*>(a + j) * *reinterpret_cast<const Eight*>(b + j);
+  }
+  float total = 0;
+  for (std::size_t i = 0; i < 8; ++i) total += sum[i];
+  return total;
+}
+
 void add_row_products(const float* weight, const std::vector<const float*>& column,
                       std::size_t rows, std::size_t length, float* sum) {
   if (column.empty()) return;

@@ -13,4 +13,8 @@ namespace haarlight {
 void add_row_products(const float* weight, const std::vector<const float*>& column,
                       std::size_t rows, std::size_t length, float* sum);
 
+/// Sum of a[j] b[j] over `length`, a multiple of 8; in eight sums that are added in order, so the
+/// same bits on every machine.
+float dot_product(const float* a, const float* b, std::size_t length);
+
 }  // namespace haarlight

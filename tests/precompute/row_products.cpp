@@ -45,6 +45,17 @@ TEST(RowProducts, EqualsThePlainSum) {
   }
 }
 
+TEST(RowProducts, DotProductEqualsThePlainSum) {
+  const auto a = random_values(384, 5), b = random_values(384, 6);
+  double expected = 0;
+  for (std::size_t j = 0; j < a.size(); ++j) {
+    expected += static_cast<double>(a[j]) * static_cast<double>(b[j]);
+  }
+  // Eight sums of 48 terms of at most 1 each, then eight more.
+  EXPECT_NEAR(static_cast<double>(dot_product(a.data(), b.data(), 384)), expected,
+              384 * 57 * 0x1p-24);
+}
+
 TEST(RowColor, FindsTheColorOfARowThatHasOne) {
   const auto grey = random_values(300, 4);
   const RgbD color{0.2, 1, 0.05};
