@@ -27,6 +27,11 @@ using namespace haarlight::viewer;
 
 constexpr int kStatedError = 1;
 constexpr int kWrongCommandLine = 2;
+#ifdef HAARLIGHT_WINDOW
+constexpr bool kHasWindow = true;
+#else
+constexpr bool kHasWindow = false;
+#endif
 
 /// Messages are one line, whatever a library below put into them.
 int fail(int code, std::string message) {
@@ -166,7 +171,7 @@ void restart_with_waiting_threads(char** argv) {
 }
 
 int run(CommandLine& c) {
-  const bool headless = c.headless || (!has_display() && c.run.frames > 0);
+  const bool headless = c.headless || (!(kHasWindow && has_display()) && c.run.frames > 0);
   std::string lines;
   if (headless) {
     if (c.run.frames == 0) {
@@ -182,8 +187,7 @@ int run(CommandLine& c) {
     }
     lines = show(c.run, c.scale);
 #else
-    return fail(kStatedError,
-                "this program was built without a window, expected --headless --frames N");
+    return fail(kStatedError, "this program was built without a window, expected --frames N");
 #endif
   }
   fmt::print("{}", lines);

@@ -83,7 +83,17 @@ TEST_F(ViewProgram, ARecordingIsReplayedByRelightWithTheSameNumbers) {
 }
 
 TEST_F(ViewProgram, SaysInOneLineWhatIsWrong) {
-  expect_one_line(view({"t.hlt", "--env", "a.exr"}), 1, "DISPLAY");
+  expect_one_line(view({"t.hlt", "--env", "a.exr"}), 1,
+                  HAARLIGHT_HAS_WINDOW ? "DISPLAY" : "without a window");
+  // Of a display that is not there a program without a window knows nothing.
+  ::setenv("DISPLAY", ":nowhere", 1);
+  const ProgramResult nowhere = view({"t.hlt", "--env", "a.exr", "--frames", "2", "--no-memory"});
+  ::unsetenv("DISPLAY");
+  if (HAARLIGHT_HAS_WINDOW) {
+    expect_one_line(nowhere, 1, "cannot open a window");
+  } else {
+    EXPECT_EQ(nowhere.code, 0) << nowhere.err;
+  }
   expect_one_line(view({"t.hlt", "--env", "a.exr", "--headless"}), 2, "--frames");
   expect_one_line(view({"--frames", "3"}), 1, "--env");
   expect_one_line(view({"none.hlt", "--env", "a.exr", "--frames", "3"}), 1, "none.hlt");

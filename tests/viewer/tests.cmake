@@ -5,7 +5,8 @@ haarlight_test(viewer/lighting_picture haarlight_viewer)
 haarlight_test(viewer/preferences haarlight_viewer)
 haarlight_test(viewer/program haarlight_prt)
 target_compile_definitions(test_viewer_program PRIVATE
-  HAARLIGHT_PROGRAM="$<TARGET_FILE:haarlight-view>" HAARLIGHT_RELIGHT="$<TARGET_FILE:haarlight>")
+  HAARLIGHT_PROGRAM="$<TARGET_FILE:haarlight-view>" HAARLIGHT_RELIGHT="$<TARGET_FILE:haarlight>"
+  HAARLIGHT_HAS_WINDOW=$<BOOL:${HAARLIGHT_HAS_WINDOW}>)
 add_dependencies(test_viewer_program haarlight-view haarlight)
 
 # The window itself, under a virtual display with software OpenGL.
