@@ -10,6 +10,7 @@
 #include <string>
 
 #include "apps/option_parsers.h"
+#include "apps/repairs.h"
 #include "apps/scene_options.h"
 #include "apps/verbs.h"
 #include "precompute/plan_scene.h"
@@ -49,6 +50,7 @@ void PlanCommand::run() {
   planning.error = options.error;
   const Plan plan = scene.vertices ? plan_mesh(staged.scene, planning)
                                    : plan_image(staged.scene, staged.stage.camera, planning);
+  print_notes(scene.scene, plan.notes);
   if (json) {
     fmt::print("{}\n", to_json(plan, true));
     return;

@@ -15,6 +15,7 @@
 #include "apps/option_parsers.h"
 #include "apps/outputs.h"
 #include "apps/progress_printer.h"
+#include "apps/repairs.h"
 #include "apps/run_options.h"
 #include "apps/scene_options.h"
 #include "apps/verbs.h"
@@ -93,6 +94,7 @@ void PrecomputeCommand::run_alone_or_together(Distribution* others) {
              made.camera_made ? "framing camera" : "camera of the scene",
              made.ground_added ? ", ground added" : "");
   if (mesh) print_mesh(*mesh);
+  print_notes(scene.scene, report.notes);
   print_outcome(output, options, report);
 }
 

@@ -26,15 +26,24 @@ void print_repairs(const std::filesystem::path& file, const EnvironmentReport& r
 void print_repairs(const std::filesystem::path& file, const SceneReport& report) {
   print_count(file, report.dropped_degenerate, "triangles without area dropped");
   print_count(file, report.dropped_not_finite,
-              "triangles with a corner that is not finite dropped");
+              "triangles with a corner that is not finite or beyond 1e37 dropped");
   print_count(file, report.dropped_duplicate, "repeated triangles dropped");
+  print_count(file, report.dropped_out_of_range,
+              "triangles that name vertices that are not there dropped");
   print_count(file, report.dropped_not_triangle, "points and lines left out");
+  print_count(file, report.against_normals,
+              "triangles wound against their normals, the normals decide");
+  print_count(file, report.tiny, "triangles too small beside the whole scene to be told apart");
   print_count(file, report.unused_vertices, "unused vertices left out");
   print_count(file, report.normals_made, "vertex normals made");
   print_count(file, report.textures_missing, "textures not found, plain colours used");
   print_count(file, report.blended_materials, "blended materials taken as holes or thin walls");
   print_count(file, report.rough_glass, "materials of rough glass taken as smooth glass");
   print_count(file, report.energy_scaled, "materials that reflect more than all light scaled down");
+}
+
+void print_notes(const std::filesystem::path& file, const std::vector<std::string>& notes) {
+  for (const std::string& note : notes) fmt::print(stderr, "{}: {}\n", file.string(), note);
 }
 
 }  // namespace haarlight

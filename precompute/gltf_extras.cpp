@@ -4,12 +4,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -110,6 +112,79 @@ std::optional<Camera> find_camera(const json& file) {
   return std::nullopt;
 }
 
+// The nodes of the scene as a tree, checked: the scene reader goes down it by recursion, once for
+// each way that leads to a node. Returns the meshes that are in it, by number; none for glTF 1.0.
+std::set<std::size_t> meshes_in_scene(const json& file, const std::string& name) {
+  std::set<std::size_t> meshes;
+  if (!file.contains("nodes") || !file.at("nodes").is_array() || !file.contains("scenes") ||
+      !file.at("scenes").is_array()) {
+    return meshes;
+  }
+  constexpr int kDeepest = 512;
+  constexpr std::size_t kMostVisits = 1000000;
+  const json& nodes = file.at("nodes");
+  const auto number = file.value("scene", std::size_t{0});
+  if (number >= file.at("scenes").size()) return meshes;
+  struct Visit {
+    std::size_t node;
+    int depth;
+  };
+  std::vector<Visit> todo;
+  const auto add = [&](const json& parent, const char* key, int depth) {
+    if (!parent.contains(key)) return;
+    for (const auto& child : parent.at(key)) todo.push_back({child.get<std::size_t>(), depth});
+  };
+  add(file.at("scenes").at(number), "nodes", 1);
+  for (std::size_t visits = 0; !todo.empty(); ++visits) {
+    const Visit here = todo.back();
+    todo.pop_back();
+    const auto refuse = [&](const std::string& why) {
+      throw Error(ErrorKind::format, fmt::format("{}: node {} {}", name, here.node, why));
+    };
+    if (here.node >= nodes.size()) {
+      refuse(fmt::format("is named but not there, expected a number below {}", nodes.size()));
+    }
+    if (here.depth > kDeepest) {
+      refuse(fmt::format("is {} levels down, expected at most {} and no circle", here.depth,
+                         kDeepest));
+    }
+    if (visits > kMostVisits) {
+      refuse(fmt::format("is met after {} others, expected a tree of fewer nodes", kMostVisits));
+    }
+    const json& node = nodes.at(here.node);
+    if (node.contains("mesh")) meshes.insert(node.at("mesh").get<std::size_t>());
+    add(node, "children", here.depth + 1);
+  }
+  return meshes;
+}
+
+std::int64_t count_of(const json& accessors, const json& object, const char* key) {
+  if (!object.contains(key)) return -1;
+  const auto number = object.at(key).get<std::size_t>();
+  return number < accessors.size() ? accessors.at(number).value("count", std::int64_t{0}) : 0;
+}
+
+// Triangles that the primitives of `meshes` promise, each once.
+std::int64_t promised_triangles(const json& file, const std::set<std::size_t>& meshes) {
+  if (!file.contains("meshes") || !file.contains("accessors")) return 0;
+  const json& accessors = file.at("accessors");
+  std::int64_t all = 0;
+  for (const std::size_t m : meshes) {
+    if (m >= file.at("meshes").size()) continue;
+    for (const json& primitive : file.at("meshes").at(m).at("primitives")) {
+      std::int64_t corners = count_of(accessors, primitive, "indices");
+      if (corners < 0 && primitive.contains("attributes")) {
+        corners = count_of(accessors, primitive.at("attributes"), "POSITION");
+      }
+      constexpr int kTriangles = 4, kStrip = 5, kFan = 6;
+      const int mode = primitive.value("mode", kTriangles);
+      if (mode == kTriangles) all += std::max<std::int64_t>(corners, 0) / 3;
+      if (mode == kStrip || mode == kFan) all += std::max<std::int64_t>(corners - 2, 0);
+    }
+  }
+  return all;
+}
+
 // The JSON text: the whole .gltf, or the first chunk of a .glb.
 std::string json_text(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -119,8 +194,13 @@ std::string json_text(const std::filesystem::path& file) {
   std::string bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
   if (!bytes.starts_with("glTF")) return bytes;
   constexpr std::size_t kHeader = 12, kChunkHeader = 8;
-  std::uint32_t size = 0;
+  std::uint32_t size = 0, version = 0;
   if (bytes.size() < kHeader + kChunkHeader) return {};
+  std::memcpy(&version, bytes.data() + 4, sizeof version);
+  if (version != 2) {
+    throw Error(ErrorKind::format,
+                fmt::format("{}: a GLB of version {}, expected version 2", file.string(), version));
+  }
   std::memcpy(&size, bytes.data() + kHeader, sizeof size);
   if (bytes.compare(kHeader + 4, 4, "JSON") != 0 || size > bytes.size() - kHeader - kChunkHeader) {
     return {};
@@ -135,6 +215,8 @@ GltfExtras read_gltf_extras(const std::filesystem::path& file) {
     const json parsed = json::parse(json_text(file));
     GltfExtras extras;
     extras.material = gltf_materials(parsed);
+    const std::set<std::size_t> meshes = meshes_in_scene(parsed, file.string());
+    extras.triangles = promised_triangles(parsed, meshes);
     extras.camera = find_camera(parsed);
     return extras;
   } catch (const json::exception&) {

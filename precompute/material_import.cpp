@@ -160,6 +160,8 @@ Material import_obj_material(const aiMaterial& in, TextureImport& textures, cons
       out.model = SurfaceModel::glass;
       out.albedo = color(in, AI_MATKEY_COLOR_TRANSPARENT, {1, 1, 1});
       if (l1_norm(out.albedo) == 0) out.albedo = {1, 1, 1};  // no glass lets nothing through
+      // Tf is of the body, which is passed by way of two surfaces.
+      out.albedo = {std::sqrt(out.albedo.r), std::sqrt(out.albedo.g), std::sqrt(out.albedo.b)};
       return out;
     default:
       break;

@@ -5,6 +5,7 @@
 #include "precompute/mesh_tiles.h"
 #include "precompute/picture_tiles.h"
 #include "precompute/precompute_mesh.h"
+#include "precompute/scene_notes.h"
 #include "precompute/vertex_sampler.h"
 
 namespace haarlight {
@@ -16,7 +17,9 @@ Plan plan_image(const Scene& scene, const Camera& camera, const PlanOptions& opt
   };
   PlanOptions picture = options;
   picture.vertices = false;
-  return make_plan(scene, source, image_row_order(camera.width, camera.height), picture);
+  Plan plan = make_plan(scene, source, image_row_order(camera.width, camera.height), picture);
+  plan.notes = scene_notes(scene, visibility, &camera);
+  return plan;
 }
 
 Plan plan_mesh(const Scene& scene, const PlanOptions& options) {
@@ -27,7 +30,9 @@ Plan plan_mesh(const Scene& scene, const PlanOptions& options) {
   };
   PlanOptions vertices = options;
   vertices.vertices = true;
-  return make_plan(scene, source, mesh_row_order(transport_mesh(scene)), vertices);
+  Plan plan = make_plan(scene, source, mesh_row_order(transport_mesh(scene)), vertices);
+  plan.notes = scene_notes(scene, visibility, nullptr);
+  return plan;
 }
 
 }  // namespace haarlight

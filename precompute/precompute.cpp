@@ -6,12 +6,16 @@
 
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "precompute/distribution.h"
 #include "precompute/fingerprint.h"
 #include "precompute/picture_tiles.h"
 #include "precompute/run_checks.h"
 #include "precompute/scene_meta.h"
+#include "precompute/scene_notes.h"
 #include "precompute/tile_run.h"
 
 namespace haarlight {
@@ -56,6 +60,7 @@ PrecomputeReport precompute_image(const Scene& scene, const Camera& camera,
                                   const std::filesystem::path& file, const Progress& progress) {
   std::optional<Visibility> visibility;
   std::optional<PictureTiles> tiles;
+  std::vector<std::string> notes;
   together(options.distribution, [&] {
     check(static_cast<const RunOptions&>(options));
     check(options.trace);
@@ -63,6 +68,7 @@ PrecomputeReport precompute_image(const Scene& scene, const Camera& camera,
     check_output(file);
     visibility.emplace(scene);
     tiles.emplace(scene, *visibility, camera, options.trace);
+    notes = scene_notes(scene, *visibility, &camera);
   });
   TileRun run;
   run.info.face_size = options.trace.face_size;
@@ -71,7 +77,9 @@ PrecomputeReport precompute_image(const Scene& scene, const Camera& camera,
   run.info.camera = camera;
   run.fingerprint = precompute_fingerprint(scene, camera, options);
   run.meta = meta_json(scene, options, file, run.fingerprint);
-  return run_tiles(*tiles, run, options, file, progress);
+  PrecomputeReport report = run_tiles(*tiles, run, options, file, progress);
+  report.notes = std::move(notes);
+  return report;
 }
 
 }  // namespace haarlight

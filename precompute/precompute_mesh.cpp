@@ -16,6 +16,7 @@
 #include "precompute/mesh_tiles.h"
 #include "precompute/run_checks.h"
 #include "precompute/scene_meta.h"
+#include "precompute/scene_notes.h"
 #include "precompute/tile_run.h"
 #include "precompute/vertex_sampler.h"
 
@@ -135,6 +136,7 @@ MeshReport precompute_mesh(const Scene& scene, const Camera& camera, const MeshO
     return !progress || progress(first + (1 - first) * share);
   };
   report.run = run_tiles(*tiles, run, rest, file, tracing);
+  report.run.notes = scene_notes(scene, *visibility, nullptr);
   return report;
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "precompute/point_tracer.h"
@@ -72,15 +73,16 @@ struct PrecomputeReport {
   double pilot_seconds = 0;   ///< of that, choosing the thresholds
   StageSeconds stages;        ///< without pilots
   RunEnd end = RunEnd::done;
-  bool complete = false;          ///< every tile of the transport (or shard) is traced
-  bool limited_by_size = false;   ///< max_bytes asked for more dropping than `error` would
-  int workers = 0;                ///< threads that traced: as many as memory allows
-  int tiles = 0;                  ///< to trace: of the transport, or of the shard
-  int resumed_tiles = 0;          ///< of those, found in the journal
-  int tiles_traced = 0;           ///< of those, traced by now, in this run and before
-  std::int64_t blocks = 0;        ///< traced now, of 16 rows with something to see
-  std::int64_t rgb_blocks = 0;    ///< of those, with three channels
-  std::vector<float> thresholds;  ///< per band
+  bool complete = false;           ///< every tile of the transport (or shard) is traced
+  bool limited_by_size = false;    ///< max_bytes asked for more dropping than `error` would
+  int workers = 0;                 ///< threads that traced: as many as memory allows
+  int tiles = 0;                   ///< to trace: of the transport, or of the shard
+  int resumed_tiles = 0;           ///< of those, found in the journal
+  int tiles_traced = 0;            ///< of those, traced by now, in this run and before
+  std::int64_t blocks = 0;         ///< traced now, of 16 rows with something to see
+  std::int64_t rgb_blocks = 0;     ///< of those, with three channels
+  std::vector<float> thresholds;   ///< per band
+  std::vector<std::string> notes;  ///< see precompute/scene_notes.h
 };
 
 }  // namespace haarlight

@@ -60,11 +60,17 @@ struct Triangle {
 /// What the importer mended; printed by programs, tested by tests.
 struct SceneReport {
   std::int64_t dropped_degenerate = 0;    ///< zero-area or with repeated corners
-  std::int64_t dropped_not_finite = 0;    ///< with a NaN or infinite corner
+  std::int64_t dropped_not_finite = 0;    ///< with a corner that is NaN or beyond 1e37
   std::int64_t dropped_duplicate = 0;     ///< same three corners as an earlier one
+  std::int64_t dropped_out_of_range = 0;  ///< that name a vertex that is not there; glTF alone,
+                                          ///< other files are refused
   std::int64_t dropped_not_triangle = 0;  ///< points and lines
-  std::int64_t normals_made = 0;          ///< vertices whose normal was missing, zero or not finite
-  std::int64_t unused_vertices = 0;       ///< that no triangle used: removed
+  std::int64_t against_normals = 0;  ///< triangles that all their normals say face the other way:
+                                     ///< left so, the normals decide which side is lit
+  std::int64_t tiny = 0;             ///< triangles below 1e-7 of the scene's size: kept, but single
+                                     ///< precision cannot tell their corners apart
+  std::int64_t normals_made = 0;     ///< vertices whose normal was missing, zero or not finite
+  std::int64_t unused_vertices = 0;  ///< that no triangle used: removed
   std::int64_t textures_missing = 0;   ///< named by the file, not there: the plain colour is used
   std::int64_t blended_materials = 0;  ///< alpha blending: taken as holes below one half
   std::int64_t rough_glass = 0;        ///< transmission with roughness: passes as through smooth

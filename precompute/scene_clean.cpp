@@ -18,8 +18,13 @@ namespace {
 
 const double kCreaseCosine = 0.5;  // 60 degrees
 
+// Room for the squares and sums of single precision's users.
+constexpr double kFarthest = 1e37;
+// Of the size of the scene: about what single precision tells apart there.
+constexpr double kTiny = 1e-7;
+
 bool finite(const Vec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+  return std::abs(v.x) <= kFarthest && std::abs(v.y) <= kFarthest && std::abs(v.z) <= kFarthest;
 }
 
 // Any fixed number of plain values as a key: equal bytes are equal keys (no padding, no -0).
@@ -103,6 +108,28 @@ void drop_broken(Scene& scene, const std::vector<std::uint32_t>& place) {
     kept.push_back(t);
   }
   scene.triangle = std::move(kept);
+}
+
+// Counts what is left so but may surprise; see SceneReport.
+void count_oddities(Scene& scene) {
+  Vec3 low = scene.position[scene.triangle.front().vertex[0]], high = low;
+  for (const Triangle& t : scene.triangle) {
+    for (const std::uint32_t v : t.vertex) {
+      const Vec3& p = scene.position[v];
+      low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+    }
+  }
+  const double tiny = kTiny * std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+  for (const Triangle& t : scene.triangle) {
+    const Vec3& a = scene.position[t.vertex[0]];
+    const Vec3 ab = scene.position[t.vertex[1]] - a, ac = scene.position[t.vertex[2]] - a;
+    if (std::max(length(ab), length(ac)) < tiny) ++scene.report.tiny;
+    const Vec3 face = cross(ab, ac);
+    scene.report.against_normals +=
+        std::all_of(t.vertex.begin(), t.vertex.end(),
+                    [&](std::uint32_t v) { return dot(scene.normal[v], face) < 0; });
+  }
 }
 
 // Faces around every place, as ranges of one array.
@@ -233,6 +260,7 @@ void clean_scene(Scene& scene) {
                                           scene.name, before));
   }
   rebuild_vertices(scene, place);
+  count_oddities(scene);
 }
 
 }  // namespace haarlight

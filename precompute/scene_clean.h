@@ -7,7 +7,8 @@
 namespace haarlight {
 
 /// Makes `scene` fit for ray tracing, in place, and adds what it did to scene.report:
-/// - triangles with a corner that is not finite, without area (twice the area below 1e-12 of the
+/// - triangles with a corner that is not finite or beyond 1e37, without area (twice the area below
+/// 1e-12 of the
 ///   longest edge squared) or on the same three places as an earlier one are dropped;
 /// - normals that are zero, not finite or missing (`normal` empty) are made: the mean of the faces
 ///   around the place, weighted by their angle there, leaving out those that meet this face at more

@@ -198,6 +198,16 @@ void reserve_vertices(const aiScene& file, Scene& scene) {
   scene.triangle.reserve(faces);
 }
 
+// Triangles that a glTF file promises and its reader has not made.
+std::int64_t left_out(const aiScene& file, std::int64_t promised) {
+  std::int64_t found = 0;
+  for (unsigned m = 0; m < file.mNumMeshes; ++m) {
+    const aiMesh& mesh = *file.mMeshes[m];
+    for (unsigned f = 0; f < mesh.mNumFaces; ++f) found += mesh.mFaces[f].mNumIndices == 3;
+  }
+  return std::max<std::int64_t>(promised - found, 0);
+}
+
 void add_nodes(const aiScene& file, FileType type, Scene& scene) {
   struct Visit {
     const aiNode* node;
@@ -238,6 +248,8 @@ Scene import_scene(const std::filesystem::path& file) {
   }
   GltfExtras extras;
   if (type == FileType::gltf) extras = read_gltf_extras(file);
+  // First: the reader takes the room that the file asks for before it looks for the data.
+  if (type == FileType::ply) check_ply_length(file);
 
   // No post-processing: what it drops or alters it does not say.
   Assimp::Importer importer;
@@ -247,11 +259,11 @@ Scene import_scene(const std::filesystem::path& file) {
                                                "glTF, OBJ or PLY file",
                                                file.string(), one_line(importer.GetErrorString())));
   }
-  if (type == FileType::ply) check_ply_length(file);
 
   Scene scene;
   scene.name = file.filename().string();
   reserve_vertices(*read, scene);
+  if (type == FileType::gltf) scene.report.dropped_out_of_range = left_out(*read, extras.triangles);
   add_nodes(*read, type, scene);
   add_materials(*read, type, extras.material, file.parent_path(), scene);
   importer.FreeScene();  // cleaning a large scene wants the room

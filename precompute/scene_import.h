@@ -20,9 +20,10 @@ namespace haarlight {
 /// - OBJ: phong with albedo Kd, texture map_Kd, specular Ks, exponent Ns, all taken as linear, and
 ///   scaled down together, with a count, where they reflect more than all; metallic_roughness
 ///   where there is Pm or Pr. illum 3 and 5: mirror of Ks, or of Kd where Ks is black. illum 4, 6,
-///   7 and 9: glass with Ni (1.5 if missing or 1), tinted by Tf at each surface unless black.
-///   Other surfaces are holes where d, times map_d, is below one half, with a count. `norm` is a
-///   normal texture.
+///   7 and 9: glass with Ni (1.5 if missing or 1). Its albedo, the tint at each surface, is the
+///   square root of Tf, so that a closed body, passed by way of two surfaces, lets Tf through;
+///   white where Tf is missing or black. Other surfaces are holes where d, times map_d, is below
+///   one half, with a count. `norm` is a normal texture.
 /// - Vertex colours tint the albedo; 8-bit PLY colours are sRGB, glTF ones are linear.
 /// - No material in the file: grey, albedo 0.5.
 /// A texture that cannot be read is counted in the report and left out.

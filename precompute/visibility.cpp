@@ -246,8 +246,18 @@ Visibility::Visibility(const Scene& scene) : device_(std::make_unique<Device>())
 
 Visibility::~Visibility() = default;
 
-std::optional<Visibility::Hit> Visibility::first_hit(const Vec3& origin, const Vec3& direction,
+std::optional<Visibility::Hit> Visibility::first_hit(const Vec3& from, const Vec3& direction,
                                                      Surfaces seen) const {
+  // From far away single precision would miss the scene, and Embree refuses what is farther still:
+  // the ray begins nearer then. All surfaces are within 2 sqrt(3) of the middle.
+  constexpr double kFar = 1e4, kNear = 4;
+  Vec3 origin = from;
+  double skipped = 0;
+  if (!(dot(from, from) <= kFar * kFar)) {
+    skipped = -dot(from, direction) - kNear;
+    origin = from + skipped * direction;
+    if (!(skipped > 0) || !(dot(origin, origin) <= 4 * kNear * kNear)) return std::nullopt;
+  }
   RTCRayHit ray;
   std::memset(&ray, 0, sizeof ray);
   ray.ray.org_x = static_cast<float>(origin.x);
@@ -265,7 +275,7 @@ std::optional<Visibility::Hit> Visibility::first_hit(const Vec3& origin, const V
   const std::uint32_t place = device_->first[ray.hit.geomID] + ray.hit.primID;
   return Hit{device_->triangle_at.empty() ? place : device_->triangle_at[place],
              static_cast<double>(ray.hit.u), static_cast<double>(ray.hit.v),
-             static_cast<double>(ray.ray.tfar)};
+             skipped + static_cast<double>(ray.ray.tfar)};
 }
 
 bool Visibility::occluded(const std::array<float, 3>& origin, const Vec3& direction,

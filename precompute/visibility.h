@@ -50,9 +50,8 @@ class Visibility {
     double b1 = 0, b2 = 0;  ///< barycentric coordinates of the second and third corner
     double distance = 0;    ///< local units
   };
-  /// The nearest triangle in front of `origin` (local) along the unit `direction`.
-  std::optional<Hit> first_hit(const Vec3& origin, const Vec3& direction,
-                               Surfaces seen = kAll) const;
+  /// The nearest triangle in front of `from` (local, however far off) along the unit `direction`.
+  std::optional<Hit> first_hit(const Vec3& from, const Vec3& direction, Surfaces seen = kAll) const;
 
   /// Whether anything lies between `origin` (local) and origin + distance * direction. Both ends
   /// should be off the surfaces they belong to (kSurfaceOffset): what is met at an end blocks.

@@ -1,3 +1,4 @@
+haarlight_test(precompute/bad_scenes haarlight_precompute)
 haarlight_test(precompute/bsdf haarlight_precompute)
 haarlight_test(precompute/default_stage haarlight_precompute)
 haarlight_test(precompute/direction_table haarlight_precompute)
