@@ -128,6 +128,138 @@ TEST_F(BadInput, Scenes) {
                       {"table.obj", "camera"});
 }
 
+// A floor in glTF with its material, nodes and whatever else a test wants to break.
+std::string floor_gltf(const std::string& material, const std::string& more = "",
+                       const std::string& nodes = R"({"mesh":0})", const std::string& roots = "0") {
+  // Four corners at y = 0, then two triangles of bytes.
+  return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[)" + roots +
+         R"(]}],"nodes":[)" + nodes +
+         R"(],"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],)"
+         R"("materials":[)" +
+         material +
+         R"(],"accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"},)"
+         R"({"bufferView":1,"componentType":5121,"count":6,"type":"SCALAR"}],"bufferViews":[)"
+         R"({"buffer":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":6}],"buffers":[)"
+         R"({"byteLength":54,"uri":"floor.bin"}])" +
+         more + "}";
+}
+
+std::string floor_bytes() {
+  const float places[12] = {-1, 0, -1, -1, 0, 1, 1, 0, 1, 1, 0, -1};
+  return std::string(reinterpret_cast<const char*>(places), sizeof places) +
+         std::string{0, 1, 2, 0, 2, 3};
+}
+
+// Every verb that reads scenes, for pictures and for meshes.
+std::vector<std::vector<std::string>> scene_verbs(const std::string& scene) {
+  const std::vector<std::string> small{scene,   "--size", "8x8",     "--face", "4",
+                                       "--spp", "1",      "--paths", "256"};
+  std::vector<std::vector<std::string>> verbs{{"plan"},
+                                              {"plan", "--vertices"},
+                                              {"precompute", "-o", "new.hlt"},
+                                              {"precompute", "-o", "new.hlt", "--vertices"}};
+  for (auto& verb : verbs) {
+    if (verb.back() == "--vertices") verb.insert(verb.end(), {"--subdivide", "off"});
+    verb.insert(verb.end(), small.begin(), small.end());
+  }
+  return verbs;
+}
+
+TEST_F(BadInput, ScenesThatAreRefusedByEveryVerb) {
+  write_bytes(path("floor.bin"), floor_bytes());
+  const std::string corners = "v 0 0 0\nv 1 0 0\nv 0 0 1\n";
+  const std::string ply =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
+      "float z\nelement face 1\nproperty list int int vertex_indices\nend_header\n0 0 0\n1 0 0\n"
+      "0 0 1\n";
+  struct Case {
+    std::string name, text, said;
+  };
+  const std::vector<Case> cases{
+      {"one.obj", "v 0 0 0\n", "one.obj"},
+      {"none.obj", corners, "no triangles"},
+      {"range.obj", corners + "f 1 2 99\n", "out of range"},
+      {"nan.obj", "v nan 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n", "none of 1 triangles"},
+      {"range.ply", ply + "3 0 1 9\n", "face 0 names vertex 9"},
+      {"list.ply", ply + "2000000000 0 1 2\n", "face 0 has a list of 2000000000"},
+      {"circle.gltf", floor_gltf("{}", "", R"({"mesh":0,"children":[0]})"), "node 0"},
+      {"material.gltf", floor_gltf(R"({"pbrMetallicRoughness":[1]})"), "material.gltf"},
+      {"nan.gltf", floor_gltf(R"({"alphaCutoff":NaN})"), "nan.gltf"}};
+  for (const Case& c : cases) {
+    write_bytes(path(c.name), c.text);
+    for (const auto& verb : scene_verbs(c.name)) expect_stated_error(verb, {c.name, c.said});
+  }
+}
+
+// What can be repaired is, with a line that says so, and the run goes on.
+TEST_F(BadInput, ScenesThatAreTakenWithAWord) {
+  write_bytes(path("floor.bin"), floor_bytes());
+  write_bytes(path("fake.png"), "not a picture");
+  const std::string images = R"(,"textures":[{"source":0}],"images":[{"uri":"fake.png"}])";
+  const std::string missing = R"(,"textures":[{"source":0}],"images":[{"uri":"none.png"}])";
+  const std::string camera =
+      R"(,"cameras":[{"type":"perspective","perspective":{"yfov":0.8,"znear":0.1}}])";
+  const auto seen_from = [&](const std::string& place) {
+    return floor_gltf("{}", camera, R"({"mesh":0},{"camera":0,"translation":)" + place + "}",
+                      "0,1");
+  };
+  const std::string table = read_bytes(path("table.obj"));
+  struct Case {
+    std::string name, text, said;
+    bool of_vertices = true;  // whether it matters to them
+  };
+  const std::string textured = R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}})";
+  const std::vector<Case> cases{
+      {"nan.obj", table + "v nan 0 0\nf 1 2 9\n", "1 triangles with a corner that is not finite"},
+      {"twice.obj", table + "f 1 4 3\nf 1 1 2\n", "1 repeated triangles"},
+      {"normals.obj", table + "vn 0 0 0\nf 5//1 8//1 1//1\n", "vertex normals made"},
+      {"flipped.obj", "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nvn 0 -1 0\nf 1//1 3//1 2//1\n",
+       "1 triangles wound against their normals"},
+      {"fake.gltf", floor_gltf(textured, images), "1 textures not found"},
+      {"missing.gltf", floor_gltf(R"({"normalTexture":{"index":0}})", missing),
+       "1 textures not found"},
+      {"black.gltf", floor_gltf(R"({"pbrMetallicRoughness":{"baseColorFactor":[0,0,0,1]}})"),
+       "all materials are black"},
+      {"away.gltf", seen_from("[0,0.5,-5]"), "nothing of the scene is in the picture", false},
+      {"far.gltf", seen_from("[0,0.5,1e20]"), "nothing of the scene is in the picture", false},
+      {"lens.gltf",
+       floor_gltf(R"({"extensions":{"KHR_materials_transmission":{"transmissionFactor":1}}})"),
+       "1 materials of rough glass"}};
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    const Case& c = cases[i];
+    SCOPED_TRACE(c.name);
+    write_bytes(path(c.name), c.text);
+    // One of plan and precompute looks at the picture, the other at the vertices; by turns.
+    const auto verbs = scene_verbs(c.name);
+    for (const auto& verb : {verbs[i % 2], verbs[3 - i % 2]}) {
+      const bool of_vertices = std::find(verb.begin(), verb.end(), "--vertices") != verb.end();
+      const ProgramResult result = run(verb);
+      EXPECT_EQ(result.code, 0) << result.err;
+      if (of_vertices && !c.of_vertices) continue;
+      const std::size_t place = result.err.find(c.said);
+      ASSERT_NE(place, std::string::npos) << result.err;
+      EXPECT_EQ(result.err.find(c.said, place + 1), std::string::npos) << "said twice";
+    }
+  }
+}
+
+// Nothing to repair and nothing to say.
+TEST_F(BadInput, OddMaterialsAreNoFault) {
+  write_bytes(path("floor.bin"), floor_bytes());
+  for (const char* material :
+       {R"({"pbrMetallicRoughness":{"baseColorFactor":[null,2,-4,1],"roughnessFactor":null}})",
+        R"({"alphaMode":"MASK"})", R"({"emissiveFactor":[1,1,1]})"}) {
+    SCOPED_TRACE(material);
+    write_bytes(path("odd.gltf"), floor_gltf(material));
+    for (const auto& verb : scene_verbs("odd.gltf")) {
+      const ProgramResult result = run(verb);
+      EXPECT_EQ(result.code, 0) << result.err;
+      EXPECT_EQ(result.err.find("odd.gltf: all"), std::string::npos) << result.err;
+      EXPECT_EQ(result.err.find("nothing of"), std::string::npos) << result.err;
+    }
+  }
+}
+
 TEST_F(BadInput, Transports) {
   expect_stated_error(relight("none.hlt", "room.exr"), {"none.hlt"});
   expect_stated_error(relight("room.exr", "room.exr"), {"room.exr"});
