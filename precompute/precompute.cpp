@@ -2,8 +2,6 @@
 
 #include "precompute/precompute.h"
 
-#include <fmt/format.h>
-
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -19,30 +17,6 @@
 #include "precompute/tile_run.h"
 
 namespace haarlight {
-namespace {
-
-std::string meta_json(const Scene& scene, const PrecomputeOptions& options,
-                      const std::filesystem::path& file, const std::string& fingerprint) {
-  const TraceOptions& t = options.trace;
-  nlohmann::json meta{{"generator", fmt::format("haarlight tracer {}", kTracerVersion)},
-                      {"scene", scene_meta(scene)},
-                      {"options",
-                       {{"face", t.face_size},
-                        {"spp", t.spp},
-                        {"adaptive", t.adaptive},
-                        {"pixel_samples", t.pixel_samples},
-                        {"error", options.error},
-                        {"indirect_face", t.indirect_face},
-                        {"noise", t.noise},
-                        {"paths", t.paths},
-                        {"seed", t.seed}}},
-                      {"effects", to_string(t.effects)}};
-  if (!options.plan.empty()) meta["plan"] = nlohmann::json::parse(options.plan);
-  add_origin(meta, options, file, fingerprint);
-  return meta.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
-
-}  // namespace
 
 std::string precompute_fingerprint(const Scene& scene, const Camera& camera,
                                    const PrecomputeOptions& options) {
@@ -76,7 +50,9 @@ PrecomputeReport precompute_image(const Scene& scene, const Camera& camera,
   run.info.height = camera.height;
   run.info.camera = camera;
   run.fingerprint = precompute_fingerprint(scene, camera, options);
-  run.meta = meta_json(scene, options, file, run.fingerprint);
+  nlohmann::json meta = run_meta(scene, options, file, run.fingerprint);
+  meta["options"]["pixel_samples"] = options.trace.pixel_samples;
+  run.meta = meta_text(meta);
   PrecomputeReport report = run_tiles(*tiles, run, options, file, progress);
   report.notes = std::move(notes);
   return report;

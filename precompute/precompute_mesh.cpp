@@ -2,8 +2,6 @@
 
 #include "precompute/precompute_mesh.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <chrono>
 #include <memory>
@@ -27,29 +25,6 @@ namespace {
 constexpr int kVertexVersion = 1;
 
 constexpr double kSubdivisionShare = 0.1;  // of the progress shown
-
-std::string meta_json(const Scene& scene, const MeshOptions& options, const MeshReport& report,
-                      const std::filesystem::path& file, const std::string& fingerprint) {
-  const TraceOptions& t = options.trace;
-  nlohmann::json meta{{"generator", fmt::format("haarlight tracer {}", kTracerVersion)},
-                      {"scene", scene_meta(scene)},
-                      {"options",
-                       {{"face", t.face_size},
-                        {"spp", t.spp},
-                        {"adaptive", t.adaptive},
-                        {"error", options.error},
-                        {"indirect_face", t.indirect_face},
-                        {"noise", t.noise},
-                        {"paths", t.paths},
-                        {"seed", t.seed},
-                        {"subdivide", options.subdivide},
-                        {"max_vertices", options.max_vertices}}},
-                      {"view_dependent_vertices", report.view_dependent},
-                      {"effects", to_string(t.effects)}};
-  if (!options.plan.empty()) meta["plan"] = nlohmann::json::parse(options.plan);
-  add_origin(meta, options, file, fingerprint);
-  return meta.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
 
 }  // namespace
 
@@ -128,7 +103,11 @@ MeshReport precompute_mesh(const Scene& scene, const Camera& camera, const MeshO
     run.info.camera = camera;
     run.info.mesh = std::make_shared<const TransportMesh>(transport_mesh(*fine));
     run.fingerprint = mesh_fingerprint(scene, camera, options);
-    run.meta = meta_json(scene, options, report, file, run.fingerprint);
+    nlohmann::json meta = run_meta(scene, options, file, run.fingerprint);
+    meta["options"]["subdivide"] = options.subdivide;
+    meta["options"]["max_vertices"] = options.max_vertices;
+    meta["view_dependent_vertices"] = report.view_dependent;
+    run.meta = meta_text(meta);
   });
   RunOptions rest = options;
   if (rest.time_limit > 0) rest.time_limit = std::max(0.01, rest.time_limit - seconds());

@@ -1,12 +1,16 @@
-// What a transport file says of the scene it was made from.
+// What a transport file says of how, and of which scene, it was made.
 
 #include "precompute/scene_meta.h"
 
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
 
+#include "precompute/fingerprint.h"
 #include "precompute/scene_files.h"
 
 namespace haarlight {
+namespace {
 
 nlohmann::json scene_meta(const Scene& scene) {
   const SceneReport& r = scene.report;
@@ -27,12 +31,34 @@ nlohmann::json scene_meta(const Scene& scene) {
           {"rough_glass", r.rough_glass}};
 }
 
-void add_origin(nlohmann::json& meta, const RunOptions& options,
-                const std::filesystem::path& output, const std::string& fingerprint) {
-  meta["fingerprint"] = fingerprint;
-  if (options.scene_file.empty()) return;
-  meta["scene_path"] = scene_path_from(options.scene_file, output);
-  meta["scene_hash"] = scene_files_hash(options.scene_file);
+}  // namespace
+
+nlohmann::json run_meta(const Scene& scene, const PrecomputeOptions& options,
+                        const std::filesystem::path& output, const std::string& fingerprint) {
+  const TraceOptions& t = options.trace;
+  nlohmann::json meta{{"generator", fmt::format("haarlight tracer {}", kTracerVersion)},
+                      {"scene", scene_meta(scene)},
+                      {"options",
+                       {{"face", t.face_size},
+                        {"spp", t.spp},
+                        {"adaptive", t.adaptive},
+                        {"error", options.error},
+                        {"indirect_face", t.indirect_face},
+                        {"noise", t.noise},
+                        {"paths", t.paths},
+                        {"seed", t.seed}}},
+                      {"effects", to_string(t.effects)},
+                      {"fingerprint", fingerprint}};
+  if (!options.plan.empty()) meta["plan"] = nlohmann::json::parse(options.plan);
+  if (!options.scene_file.empty()) {
+    meta["scene_path"] = scene_path_from(options.scene_file, output);
+    meta["scene_hash"] = scene_files_hash(options.scene_file);
+  }
+  return meta;
+}
+
+std::string meta_text(const nlohmann::json& meta) {
+  return meta.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 }  // namespace haarlight
