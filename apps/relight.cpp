@@ -21,7 +21,6 @@
 #include "prt/image_relighter.h"
 #include "prt/metrics_csv.h"
 #include "prt/motion_background.h"
-#include "prt/picture_relighter.h"
 #include "prt/relight_sequence.h"
 #include "prt/tonemap.h"
 #include "wavelet/projection.h"
@@ -93,7 +92,7 @@ void RelightCommand::check() const {
 }
 
 void RelightCommand::check_kind(const Transport& scene) const {
-  if (scene.kind() == TransportKind::mesh) return;
+  if (scene.info().mesh) return;
   if (sequence.orbit_degrees != 0) {
     refuse_option("--orbit", fmt::format("{}", sequence.orbit_degrees),
                   "none, since the transport is of one view and not of a mesh");

@@ -3,6 +3,7 @@
 #include "prt/frame_relighter.h"
 
 #include <chrono>
+#include <utility>
 #include <vector>
 
 #include "core/image_metrics.h"
@@ -25,11 +26,12 @@ LightingOptions with_weights(LightingOptions lighting, WaveletWeight weight,
 }  // namespace
 
 FrameRelighter::FrameRelighter(const Transport& transport, LightingOptions lighting,
-                               WaveletWeight weight)
+                               WaveletWeight weight, RelighterFactory make)
     : tracker_(transport.layout(), with_weights(std::move(lighting), weight, transport)),
       weight_(weight),
-      relighter_(transport) {
-  relighter_.expect_resets(tracker_.options().method == LightingMethod::pbi);
+      make_(std::move(make)),
+      relighter_(make_relighter(make_, transport)) {
+  relighter_->expect_resets(tracker_.options().method == LightingMethod::pbi);
 }
 
 void FrameRelighter::set_options(const LightingOptions& lighting, WaveletWeight weight) {
@@ -48,7 +50,7 @@ void FrameRelighter::set_options(const LightingOptions& lighting, WaveletWeight 
     tracker_.set_options(with_weights(lighting, weight, transport()));
     weight_ = weight;
   }
-  relighter_.expect_resets(tracker_.options().method == LightingMethod::pbi);
+  relighter_->expect_resets(tracker_.options().method == LightingMethod::pbi);
 }
 
 void FrameRelighter::compare_with_reference(bool compare) {
@@ -57,12 +59,13 @@ void FrameRelighter::compare_with_reference(bool compare) {
   LightingOptions exact;
   exact.method = LightingMethod::reference;
   exact_.emplace(
-      Exact{LightingTracker(transport().layout(), exact), PictureRelighter(transport())});
-  exact_->relighter.expect_resets(false);
+      Exact{LightingTracker(transport().layout(), exact), make_relighter(make_, transport())});
+  exact_->relighter->set_exact(true);
+  exact_->relighter->expect_resets(false);
 }
 
 const Image* FrameRelighter::reference() const {
-  return compare_ && exact_ ? &exact_->relighter.picture() : nullptr;
+  return compare_ && exact_ ? &exact_->relighter->picture() : nullptr;
 }
 
 // A black target under the reference method takes everything back, and leaves sums of exactly 0.
@@ -71,7 +74,8 @@ void FrameRelighter::go_dark() {
   LightingOptions all = options;
   all.method = LightingMethod::reference;
   tracker_.set_options(std::move(all));
-  relighter_.apply(
+  relighter_->set_exact(true);
+  relighter_->apply(
       tracker_.advance(std::vector<Rgb>(static_cast<std::size_t>(transport().layout().size()))));
   tracker_.set_options(options);
 }
@@ -87,7 +91,8 @@ const FrameMetrics& FrameRelighter::relight(std::span<const Rgb> target, FrameSt
   const LightingUpdate& update =
       start == FrameStart::exact ? tracker_.start_exact(target) : tracker_.advance(target);
   const Clock::time_point decided = Clock::now();
-  const RelightStats stats = relighter_.apply(update);
+  relighter_->set_exact(start == FrameStart::exact || lighting.method == LightingMethod::reference);
+  const RelightStats stats = relighter_->apply(update);
   const Clock::time_point end = Clock::now();
   update_ = &update;
 
@@ -113,10 +118,10 @@ const FrameMetrics& FrameRelighter::relight(std::span<const Rgb> target, FrameSt
   metrics_.image_rel_rmse.reset();
   metrics_.image_max_abs.reset();
   if (compare_ && exact_) {
-    exact_->relighter.set_camera(relighter_.camera());
-    exact_->relighter.apply(exact_->tracker.advance(target));
+    exact_->relighter->set_camera(relighter_->camera());
+    exact_->relighter->apply(exact_->tracker.advance(target));
     const ImageDifference difference =
-        compare_images(relighter_.picture(), exact_->relighter.picture());
+        compare_images(relighter_->picture(), exact_->relighter->picture());
     metrics_.image_rel_rmse = difference.relative_rmse;
     metrics_.image_max_abs = difference.max_abs;
   }

@@ -4,13 +4,14 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 
 #include "core/image.h"
 #include "prt/lighting_tracker.h"
-#include "prt/picture_relighter.h"
+#include "prt/relighter.h"
 #include "prt/scene_view.h"
 #include "prt/transport.h"
 #include "prt/wavelet_weight.h"
@@ -43,11 +44,13 @@ enum class FrameStart {
   dark,     ///< forget what is shown, then advance
 };
 
-/// picture() == T * tracker().shown() after every frame.
+/// picture() is that of T * tracker().shown() after every frame; of a renderer that follows step by
+/// step, once settled() (see Relighter).
 class FrameRelighter {
  public:
-  /// `lighting.weights` are ignored: `weight` says which.
-  FrameRelighter(const Transport& transport, LightingOptions lighting, WaveletWeight weight);
+  /// `lighting.weights` are ignored: `weight` says which. `make` makes the renderer.
+  FrameRelighter(const Transport& transport, LightingOptions lighting, WaveletWeight weight,
+                 RelighterFactory make = {});
 
   /// From the next frame on. Cheap when nothing changed. Throws as LightingTracker::set_options.
   void set_options(const LightingOptions& lighting, WaveletWeight weight);
@@ -58,27 +61,30 @@ class FrameRelighter {
   /// number is the caller's. Throws as LightingTracker::advance, and then changes nothing.
   const FrameMetrics& relight(std::span<const Rgb> target, FrameStart start, int frame);
 
-  /// From where a mesh is drawn from the next frame on; see PictureRelighter::set_camera.
-  void set_camera(const Camera& camera) { relighter_.set_camera(camera); }
+  /// From where a mesh is drawn from the next frame on; see Relighter::set_camera.
+  void set_camera(const Camera& camera) { relighter_->set_camera(camera); }
 
-  const Image& picture() const { return relighter_.picture(); }
+  const Image& picture() const { return relighter_->picture(); }
   /// What the picture looks at; valid until the next frame.
-  SceneView view() const { return {relighter_.camera(), relighter_.coverage()}; }
+  SceneView view() const { return {relighter_->camera(), relighter_->coverage()}; }
   /// The same under the exact lighting; null unless asked for.
   const Image* reference() const;
   const LightingTracker& tracker() const { return tracker_; }
+  /// Whether an empty update would leave the picture as it is.
+  bool settled() const { return relighter_->settled(); }
   const LightingUpdate& update() const { return *update_; }
-  const Transport& transport() const { return relighter_.transport(); }
+  const Transport& transport() const { return relighter_->transport(); }
 
  private:
   void go_dark();
 
   LightingTracker tracker_;
   WaveletWeight weight_;
-  PictureRelighter relighter_;
+  RelighterFactory make_;
+  std::unique_ptr<Relighter> relighter_;
   struct Exact {
     LightingTracker tracker;
-    PictureRelighter relighter;
+    std::unique_ptr<Relighter> relighter;
   };
   std::optional<Exact> exact_;
   bool compare_ = false;

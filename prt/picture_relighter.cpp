@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "core/error.h"
-#include "prt/finish_rows.h"
 #include "prt/image_relighter.h"
 #include "prt/mesh_picture.h"
 #include "prt/mesh_relighter.h"
@@ -102,16 +101,6 @@ std::span<const float> PictureRelighter::coverage() const {
 
 const Transport& PictureRelighter::transport() const {
   return state_->image ? state_->image->transport() : state_->vertices->transport();
-}
-
-Image relight_picture_once(const Transport& transport, std::span<const Rgb> lighting,
-                           const Camera& camera) {
-  if (transport.kind() == TransportKind::image) return relight_once(transport, lighting);
-  PictureRelighter relighter(transport);
-  relighter.expect_resets(false);
-  relighter.set_camera(camera);
-  relighter.apply(full_update(transport.layout(), lighting));
-  return relighter.picture();
 }
 
 }  // namespace haarlight

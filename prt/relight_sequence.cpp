@@ -28,7 +28,7 @@ void hand_out(const FrameRelighter& relighter, const FrameMetrics& metrics,
 
 Camera sequence_camera(const Transport& transport, const SequenceOptions& options, int frame) {
   Camera camera = transport.info().camera;
-  if (transport.kind() == TransportKind::image) {
+  if (!transport.info().mesh) {
     if (options.orbit_degrees != 0 || options.width != 0 || options.height != 0) {
       throw Error(ErrorKind::invalid_argument,
                   "an orbit or a size is for the transport of a mesh; this one is of one view");
@@ -43,13 +43,14 @@ Camera sequence_camera(const Transport& transport, const SequenceOptions& option
 }
 
 void relight_sequence(const Transport& transport, const Environment& from, const Environment* to,
-                      const SequenceOptions& options, const FrameDone& frame_done) {
+                      const SequenceOptions& options, const FrameDone& frame_done,
+                      const RelighterFactory& make) {
   if (options.frames < 1) {
     throw Error(ErrorKind::invalid_argument,
                 fmt::format("frames is {}, expected at least 1", options.frames));
   }
   Motion motion(options.motion, transport.layout(), from, to);
-  FrameRelighter relighter(transport, options.lighting, options.weight);
+  FrameRelighter relighter(transport, options.lighting, options.weight, make);
   relighter.compare_with_reference(options.against_reference);
   for (int frame = 0; frame < options.frames; ++frame) {
     const std::span<const Rgb> target = motion.coefficients(frame);
@@ -63,7 +64,7 @@ void relight_sequence(const Transport& transport, const Environment& from, const
 
 void relight_recording(const Transport& transport, std::span<const Environment> environments,
                        const MotionRecording& recording, bool against_reference,
-                       const FrameDone& frame_done) {
+                       const FrameDone& frame_done, const RelighterFactory& make) {
   if (environments.size() < recording.environments.size() || recording.frames.empty()) {
     throw Error(
         ErrorKind::invalid_argument,
@@ -80,7 +81,7 @@ void relight_recording(const Transport& transport, std::span<const Environment> 
     return options;
   };
   const RecordedFrame& first = recording.frames.front();
-  FrameRelighter relighter(transport, options_of(first), first.weight);
+  FrameRelighter relighter(transport, options_of(first), first.weight, make);
   relighter.compare_with_reference(against_reference);
   const int frames = static_cast<int>(recording.frames.size());
   for (int i = 0; i < frames; ++i) {

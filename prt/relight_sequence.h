@@ -45,11 +45,12 @@ using FrameDone = std::function<bool(const SequenceFrame& frame)>;
 /// say. Throws Error{invalid_argument} for an orbit or a size of a picture's transport.
 Camera sequence_camera(const Transport& transport, const SequenceOptions& options, int frame);
 
-/// Runs options.frames frames. `to` is the second environment of MotionKind::blend. Metrics but for
-/// times are the same bits on any number of threads. Throws Error{invalid_argument} for options out
-/// of range or a blend without `to`.
+/// Runs options.frames frames. `to` is the second environment of MotionKind::blend; `make` makes
+/// the renderer. Metrics but for times are the same bits on any number of threads. Throws
+/// Error{invalid_argument} for options out of range or a blend without `to`.
 void relight_sequence(const Transport& transport, const Environment& from, const Environment* to,
-                      const SequenceOptions& options, const FrameDone& frame_done);
+                      const SequenceOptions& options, const FrameDone& frame_done,
+                      const RelighterFactory& make = {});
 
 /// Replays a recording, frame by frame, with the numbers it had. `environments` are those it names,
 /// in its order. A mesh is drawn from
@@ -57,6 +58,6 @@ void relight_sequence(const Transport& transport, const Environment& from, const
 /// not that many.
 void relight_recording(const Transport& transport, std::span<const Environment> environments,
                        const MotionRecording& recording, bool against_reference,
-                       const FrameDone& frame_done);
+                       const FrameDone& frame_done, const RelighterFactory& make = {});
 
 }  // namespace haarlight

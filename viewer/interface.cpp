@@ -228,7 +228,7 @@ void Interface::handle_keys(const ViewFrame& frame) {
 // A mesh is drawn in the shape of what the panels leave, at no more pixels than are quickly filled.
 void Interface::fit_mesh(const ViewFrame& frame, float right, float bottom) {
   settings_.width = settings_.height = 0;
-  if (frame.number == 0 || frame.scene->transport.kind() != TransportKind::mesh) return;
+  if (frame.number == 0 || !frame.scene->transport.info().mesh) return;
   const float room = compare_ == CompareView::side ? 0.5f * right : right;
   if (room < 1 || bottom < 1) return;
   const float most = 720;
@@ -299,7 +299,7 @@ void Interface::handle_picture(const ViewFrame& frame, double seconds) {
 // Of a mesh: the right button, or the left with Shift, goes round it; the middle one moves it; the
 // wheel goes closer.
 void Interface::handle_view(const ViewFrame& frame, bool over_picture) {
-  if (frame.number == 0 || frame.scene->transport.kind() != TransportKind::mesh) return;
+  if (frame.number == 0 || !frame.scene->transport.info().mesh) return;
   const ImGuiIO& io = ImGui::GetIO();
   for (const int button : {0, 1, 2}) {
     if (ImGui::IsMouseClicked(button) && !io.WantCaptureMouse && over_picture &&

@@ -13,7 +13,6 @@
 #include "core/parallel.h"
 #include "prt/image_relighter.h"
 #include "prt/motion_background.h"
-#include "prt/picture_relighter.h"
 #include "prt/tonemap.h"
 #include "viewer/lighting_picture.h"
 
@@ -148,9 +147,8 @@ void Session::open_transport(const std::filesystem::path& file) {
   LightRig rig(scene->transport.layout());
   for (std::size_t i = 0; i < lights_.size(); ++i) rig.set_environment(i, lights_[i]->environment);
   FrameRelighter relighter(scene->transport, {}, WaveletWeight::area);
-  middle_ = scene->transport.kind() == TransportKind::mesh
-                ? bounding_sphere(*scene->transport.info().mesh)
-                : BoundingSphere{};
+  const auto& mesh = scene->transport.info().mesh;
+  middle_ = mesh ? bounding_sphere(*mesh) : BoundingSphere{};
   scene_ = std::move(scene);
   ++view_number_;
   camera_.reset();
@@ -228,7 +226,7 @@ void Session::set_light(const ViewSettings& settings) {
 }
 
 void Session::set_view(const ViewSettings& settings) {
-  if (scene_->transport.kind() != TransportKind::mesh) return;
+  if (!scene_->transport.info().mesh) return;
   const Camera camera = orbit_camera(scene_->transport.info().camera, middle_, settings);
   if (camera_ && *camera_ == camera) return;
   camera_ = camera;
@@ -295,7 +293,7 @@ bool Session::advance(const ViewSettings& settings, double ticks, ViewFrame& out
   }
   if (recording_now_) {
     std::optional<Camera> camera;
-    if (scene_->transport.kind() == TransportKind::mesh) camera = relighter_->view().camera;
+    if (scene_->transport.info().mesh) camera = relighter_->view().camera;
     recording_.frames.push_back(
         {light_, settings.method, lighting.wavelets, settings.weight, next_start_, camera});
   }
@@ -307,7 +305,7 @@ bool Session::advance(const ViewSettings& settings, double ticks, ViewFrame& out
   }
   allowed_ = lighting.wavelets;
   next_start_ = FrameStart::advance;
-  converged_ = metrics_.lighting_error == 0;
+  converged_ = metrics_.lighting_error == 0 && relighter_->settled();
   fresh_ = false;
   last_ = settings;
   ++frames_;
