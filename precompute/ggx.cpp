@@ -171,13 +171,6 @@ const AlbedoTable& albedo_table() {
 }  // namespace
 
 // Duff et al. 2017, "Building an Orthonormal Basis, Revisited".
-Frame::Frame(const Vec3& unit) : z(unit) {
-  const double sign = std::copysign(1.0, z.z);
-  const double a = -1 / (sign + z.z), b = z.x * z.y * a;
-  x = {1 + sign * z.x * z.x * a, sign * b, -sign * z.x};
-  y = {b, sign + z.y * z.y * a, -z.y};
-}
-
 double ggx_times_cosine(const Vec3& n, const Vec3& w, const Vec3& o, double alpha,
                         double& half_cosine) {
   half_cosine = 0;

@@ -4,17 +4,10 @@
 
 #include <optional>
 
+#include "core/frame.h"
 #include "core/vec.h"
 
 namespace haarlight {
-
-/// Three unit vectors at right angles, z the given one.
-struct Frame {
-  Vec3 x, y, z;
-  explicit Frame(const Vec3& unit);
-  Vec3 to_world(const Vec3& v) const { return x * v.x + y * v.y + z * v.z; }
-  Vec3 to_local(const Vec3& v) const { return {dot(x, v), dot(y, v), dot(z, v)}; }
-};
 
 /// D V n.w for unit w and o about the unit normal n: GGX distribution, height-correlated Smith
 /// masking (Heitz 2014); 0 unless both are above the horizon, finite at grazing. alpha > 0.

@@ -7,6 +7,7 @@
 
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "core/error.h"
 #include "prt/transport_format.h"
@@ -14,11 +15,11 @@
 namespace haarlight {
 namespace {
 
-constexpr char kJournalMagic[8] = {'H', 'l', 't', 'j', 'r', 'n', '0', '2'};
+constexpr char kJournalMagic[8] = {'H', 'l', 't', 'j', 'r', 'n', '0', '3'};
 
 struct FixedHead {
   char magic[8];
-  std::uint64_t text, mesh;  ///< bytes of the two parts that follow
+  std::uint64_t text, rest;  ///< bytes of the two parts that follow
   std::uint64_t hash;        ///< XXH3 of both
 };
 static_assert(sizeof(FixedHead) == kHeadFixedBytes);
@@ -65,22 +66,28 @@ std::vector<std::byte> pack_head(const JournalHead& head) {
                    {"max_bytes", head.max_bytes},
                    {"shard", {head.shard.index, head.shard.count}},
                    {"tiles", head.tiles}};
-  std::vector<std::byte> mesh;
+  std::vector<std::byte> rest;
+  const auto add = [&](const char* name, const std::vector<std::byte>& packed) {
+    rest.insert(rest.end(), packed.begin(), packed.end());
+    j["parts"].push_back({{"name", name}, {"bytes", packed.size()}});
+  };
   if (info.mesh) {
-    mesh = pack_mesh(*info.mesh);
+    add("mesh", pack_mesh(*info.mesh));
     j["mesh"] = {{"vertices", info.mesh->position.size()},
                  {"triangles", info.mesh->triangle.size()},
                  {"materials", !info.mesh->material.empty()}};
   }
+  if (info.view) add("view", pack_view_factors(*info.view));
+  if (info.clusters) add("clusters", pack_cluster_weights(*info.clusters));
   const std::string text = j.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   FixedHead fixed{};
   std::memcpy(fixed.magic, kJournalMagic, sizeof kJournalMagic);
   fixed.text = text.size();
-  fixed.mesh = mesh.size();
-  std::vector<std::byte> bytes(sizeof fixed + text.size() + mesh.size());
+  fixed.rest = rest.size();
+  std::vector<std::byte> bytes(sizeof fixed + text.size() + rest.size());
   std::byte* body = bytes.data() + sizeof fixed;
   std::memcpy(body, text.data(), text.size());
-  if (!mesh.empty()) std::memcpy(body + text.size(), mesh.data(), mesh.size());
+  if (!rest.empty()) std::memcpy(body + text.size(), rest.data(), rest.size());
   fixed.hash = XXH3_64bits(body, bytes.size() - sizeof fixed);
   std::memcpy(bytes.data(), &fixed, sizeof fixed);
   return bytes;
@@ -92,10 +99,10 @@ std::uint64_t packed_head_size(std::span<const std::byte> bytes) {
   std::memcpy(&fixed, bytes.data(), sizeof fixed);
   constexpr std::uint64_t kMost = std::uint64_t{1} << 40;
   if (std::memcmp(fixed.magic, kJournalMagic, sizeof kJournalMagic) != 0 || fixed.text > kMost ||
-      fixed.mesh > kMost) {
+      fixed.rest > kMost) {
     return 0;
   }
-  return sizeof fixed + fixed.text + fixed.mesh;
+  return sizeof fixed + fixed.text + fixed.rest;
 }
 
 JournalHead unpack_head(std::span<const std::byte> bytes, const std::string& name) {
@@ -120,13 +127,32 @@ JournalHead unpack_head(std::span<const std::byte> bytes, const std::string& nam
     info.height = j.at("height").get<int>();
     info.terms = j.at("terms").get<int>();
     info.camera = camera_of(j.at("camera"));
-    if (j.contains("mesh")) {
+    const std::span<const std::byte> rest = body.subspan(fixed.text);
+    const auto part = [&](const char* wanted) -> std::optional<std::span<const std::byte>> {
+      std::size_t at = 0;
+      for (const nlohmann::json& p : j.value("parts", nlohmann::json::array())) {
+        const auto size = p.at("bytes").get<std::size_t>();
+        if (size > rest.size() - at) throw refuse("its head cannot be read");
+        if (p.at("name").get<std::string>() == wanted) return rest.subspan(at, size);
+        at += size;
+      }
+      return std::nullopt;
+    };
+    if (const auto packed = part("mesh")) {
       const nlohmann::json& m = j.at("mesh");
       const MeshCounts counts{m.at("vertices").get<std::uint32_t>(),
                               m.at("triangles").get<std::uint32_t>(),
                               m.at("materials").get<bool>()};
-      info.mesh = std::make_shared<const TransportMesh>(
-          unpack_mesh(body.subspan(fixed.text), counts, name));
+      info.mesh = std::make_shared<const TransportMesh>(unpack_mesh(*packed, counts, name));
+    }
+    const std::size_t vertices = info.mesh ? info.mesh->position.size() : 0;
+    if (const auto packed = part("view")) {
+      info.view = std::make_shared<const ViewFactors>(
+          unpack_view_factors(*packed, info.terms, vertices, name));
+    }
+    if (const auto packed = part("clusters")) {
+      info.clusters =
+          std::make_shared<const ClusterWeights>(unpack_cluster_weights(*packed, vertices, name));
     }
     head.fingerprint = j.at("fingerprint").get<std::string>();
     head.thresholds = j.at("thresholds").get<std::vector<float>>();

@@ -24,7 +24,7 @@ struct JournalHead {
   int tiles = 0;  ///< of the whole transport
 };
 
-/// Magic, sizes, checksum, JSON, packed mesh.
+/// Magic, sizes, checksum, JSON, packed mesh, view factors and clusters.
 std::vector<std::byte> pack_head(const JournalHead& head);
 
 /// Bytes of the fixed part, and of the whole head as it says; 0 if it is none of ours.

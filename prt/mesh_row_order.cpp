@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <numeric>
 #include <span>
 #include <vector>
 
@@ -88,7 +89,15 @@ std::vector<std::uint32_t> mesh_row_order(const TransportMesh& mesh, int terms) 
   return order;
 }
 
+std::vector<std::uint32_t> plain_row_order(std::size_t outputs) {
+  constexpr auto kChunk = static_cast<std::size_t>(kChunkRows);
+  std::vector<std::uint32_t> order((outputs + kChunk - 1) / kChunk * kChunk, kNoOutput);
+  std::iota(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(outputs), 0u);
+  return order;
+}
+
 std::vector<std::uint32_t> row_order(const TransportInfo& info) {
+  if (info.clusters) return plain_row_order(info.output_count());
   return info.mesh ? mesh_row_order(*info.mesh, info.terms)
                    : image_row_order(info.width, info.height);
 }

@@ -8,11 +8,13 @@
 #include <cstddef>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "core/error.h"
 #include "prt/image_relighter.h"
 #include "prt/mesh_picture.h"
 #include "prt/mesh_relighter.h"
+#include "prt/term_finish.h"
 
 namespace haarlight {
 namespace {
@@ -31,10 +33,27 @@ struct PictureRelighter::State {
   std::optional<ImageRelighter> image;
   std::optional<MeshRelighter> vertices;
   std::optional<MeshPicture> drawing;
-  Image picture;  // of the mesh
+  std::optional<TermFinish> finish;  // of a mesh with view factors
+  std::vector<Rgb> radiance;         // what it finds
+  Image picture;                     // of the mesh
   Camera camera;
   bool looked = false, shaded = false;
+
+  void draw(bool changed);
 };
+
+// What changed by light or view, in this order: factors and pixels, radiance, picture.
+void PictureRelighter::State::draw(bool changed) {
+  if (!looked) {
+    drawing->look(camera);
+    if (finish) finish->look(camera.position);
+  }
+  looked = true;
+  if (shaded && !changed) return;
+  if (finish) finish->shade(vertices->radiance(), radiance);
+  drawing->shade(finish ? std::span<const Rgb>(radiance) : vertices->radiance(), picture);
+  shaded = true;
+}
 
 PictureRelighter::PictureRelighter(const Transport& transport) : state_(std::make_unique<State>()) {
   State& s = *state_;
@@ -43,14 +62,23 @@ PictureRelighter::PictureRelighter(const Transport& transport) : state_(std::mak
     s.image.emplace(transport);
     return;
   }
-  if (transport.info().terms != 1) {
+  const TransportInfo& info = transport.info();
+  if (info.clusters) {
     throw Error(ErrorKind::invalid_argument,
-                fmt::format("the transport has {} terms a vertex, expected 1: it is not for a "
-                            "view-independent picture",
-                            transport.info().terms));
+                "the transport is of clusters, expected one of a picture or a mesh");
+  }
+  if (info.terms != 1 && !info.view) {
+    throw Error(ErrorKind::invalid_argument,
+                fmt::format("the transport has {} terms a vertex and no view factors, expected 1 "
+                            "or factors",
+                            info.terms));
   }
   s.vertices.emplace(transport);
-  s.drawing.emplace(transport.info().mesh);
+  s.drawing.emplace(info.mesh);
+  if (info.view) {
+    s.finish.emplace(info.mesh, info.view);
+    s.radiance.resize(info.mesh->position.size());
+  }
 }
 
 PictureRelighter::~PictureRelighter() = default;
@@ -73,10 +101,7 @@ RelightStats PictureRelighter::apply(const LightingUpdate& update) {
   if (s.image) return s.image->apply(update);
   RelightStats stats = s.vertices->apply(update);
   const Clock::time_point begin = Clock::now();
-  if (!s.looked) s.drawing->look(s.camera);
-  s.looked = true;
-  if (!s.shaded || !update.empty()) s.drawing->shade(s.vertices->radiance(), s.picture);
-  s.shaded = true;
+  s.draw(!update.empty());
   stats.finish_ms += std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
   return stats;
 }

@@ -13,8 +13,8 @@ namespace haarlight {
 /// with its vertices' radiance.
 class PictureRelighter final : public Relighter {
  public:
-  /// The camera is the file's. Throws Error{invalid_argument} for a mesh of more than one term,
-  /// which wants view factors that this renderer does not have.
+  /// The camera is the file's. Throws Error{invalid_argument} for a mesh of more than one term
+  /// without view factors, and for clusters.
   explicit PictureRelighter(const Transport& transport);
   ~PictureRelighter() override;
   PictureRelighter(PictureRelighter&&) noexcept;

@@ -100,8 +100,10 @@ TransportHeader read_header(std::span<const std::byte> file, const std::string& 
                               header.version, kTransportVersion));
   }
   const bool first = header.version == 1;
-  if (!first && file.size() < sizeof header) cut();
-  const std::size_t hashed = first ? kTransportHeader1Hash : offsetof(TransportHeader, header_hash);
+  const std::size_t hashed = first                 ? kTransportHeader1Hash
+                             : header.version == 2 ? kTransportHeader2Hash
+                                                   : offsetof(TransportHeader, header_hash);
+  if (file.size() < hashed + sizeof header.header_hash) cut();
   header = {};
   std::memcpy(&header, file.data(), hashed);
   std::memcpy(&header.header_hash, file.data() + hashed, sizeof header.header_hash);
@@ -140,10 +142,11 @@ void check_shape(const TransportHeader& header, const std::string& name) {
     damaged(name,
             fmt::format("face size {}, expected a power of two from 1 to 1024", header.face_size));
   }
-  if (header.kind > 1) {
-    damaged(name, fmt::format("kind {}, expected 0 (picture) or 1 (mesh)", header.kind));
+  if (header.kind > 2) {
+    damaged(name,
+            fmt::format("kind {}, expected 0 (picture), 1 (mesh) or 2 (clusters)", header.kind));
   }
-  const bool mesh = header.kind == 1;
+  const bool mesh = header.kind > 0;
   const std::uint32_t most_terms = mesh ? kMaxTerms : 1;
   if (header.terms < 1 || header.terms > most_terms) {
     damaged(name, fmt::format("{} terms, expected 1 to {}", header.terms, most_terms));
@@ -153,8 +156,11 @@ void check_shape(const TransportHeader& header, const std::string& name) {
     damaged(name, fmt::format("{} vertices and {} triangles do not fit a transport of kind {}",
                               header.vertices, header.triangles, header.kind));
   }
-  const std::uint64_t outputs =
-      (mesh ? header.vertices : std::uint64_t{header.width} * header.height) * header.terms;
+  const std::uint64_t outputs =  // of clusters: known when they are read
+      (header.kind == 2 ? 0
+       : mesh           ? header.vertices
+                        : std::uint64_t{header.width} * header.height) *
+      header.terms;
   const std::uint64_t rows = std::uint64_t{header.chunk_count} * kChunkRows;
   const std::uint64_t columns = std::uint64_t{6} * header.face_size * header.face_size;
   // A chunk has at least its table of offsets: this bounds every allocation by the file's size.
@@ -164,6 +170,46 @@ void check_shape(const TransportHeader& header, const std::string& name) {
     damaged(name, fmt::format(
                       "{} x {} pixels, {} outputs in {} chunks do not fit a file of {} bytes",
                       header.width, header.height, outputs, header.chunk_count, header.file_size));
+  }
+}
+
+// View factors and clusters, where the file has them.
+void read_named(std::span<const std::byte> bytes, const TransportHeader& header,
+                const std::string& name, TransportInfo& info) {
+  if (header.version < 3) return;
+  const auto table = section_bytes(bytes, header.named, name, "table of sections");
+  constexpr std::size_t kEntry = sizeof(NamedSection);
+  if (table.size() % kEntry != 0 || table.size() / kEntry > kMostNamedSections) {
+    damaged(name, "table of sections has the wrong size");
+  }
+  const std::size_t vertices = info.mesh ? info.mesh->position.size() : 0;
+  for (std::size_t at = 0; at < table.size(); at += kEntry) {
+    NamedSection entry;
+    std::memcpy(&entry, table.data() + at, kEntry);
+    const auto is = [&](const char(&wanted)[8]) {
+      return std::memcmp(entry.name, wanted, sizeof wanted) == 0;
+    };
+    const bool view = is(kViewFactorsName), clusters = is(kClustersName);
+    const auto section = section_bytes(bytes, entry.section, name,
+                                       view       ? "view factors"
+                                       : clusters ? "clusters"
+                                                  : "a section of unknown name");
+    if ((view && info.view) || (clusters && info.clusters)) {
+      damaged(name, "a section is there twice");
+    }
+    if ((view || clusters) && !info.mesh) {
+      damaged(name, "view factors or clusters do not fit a transport of kind 0");
+    }
+    if (view) {
+      info.view = std::make_shared<const ViewFactors>(
+          unpack_view_factors(section, info.terms, vertices, name));
+    } else if (clusters) {
+      info.clusters =
+          std::make_shared<const ClusterWeights>(unpack_cluster_weights(section, vertices, name));
+    }
+  }
+  if ((info.kind == TransportKind::clusters) != (info.clusters != nullptr)) {
+    damaged(name, "clusters are wanted for a transport of kind 2, and for no other");
   }
 }
 
@@ -178,16 +224,20 @@ Transport Transport::open(const std::filesystem::path& file) {
   check_shape(header, name);
   auto data = std::make_shared<Data>(static_cast<int>(header.face_size));
   data->info = info_of(header, section_bytes(bytes, header.meta, name, "description"));
-  if (header.kind == 1) {
+  if (header.kind > 0) {
     data->info.mesh = std::make_shared<const TransportMesh>(
         unpack_mesh(section_bytes(bytes, header.mesh, name, "mesh"),
                     {header.vertices, header.triangles, header.mesh_materials == 1}, name));
   }
+  read_named(bytes, header, name, data->info);
   data->storage = mapping;
   data->file_bytes = bytes.size();
 
   const auto columns = static_cast<std::size_t>(data->layout.size());
   const std::size_t rows = static_cast<std::size_t>(header.chunk_count) * kChunkRows;
+  if (data->info.output_count() > rows) {
+    damaged(name, fmt::format("{} outputs do not fit {} rows", data->info.output_count(), rows));
+  }
   RowTables tables = unpack_tables(section_bytes(bytes, header.rows, name, "row tables"), rows,
                                    data->info.output_count(), name);
   data->row_output = std::move(tables.row_output);

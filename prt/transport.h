@@ -13,7 +13,9 @@
 
 #include "core/camera.h"
 #include "core/rgb.h"
+#include "prt/cluster_weights.h"
 #include "prt/transport_mesh.h"
+#include "prt/view_factors.h"
 #include "wavelet/haar.h"
 
 namespace haarlight {
@@ -32,8 +34,9 @@ inline constexpr std::uint32_t kNoOutput = 0xffffffffu;
 
 /// What the rows of a transport are.
 enum class TransportKind {
-  image,  ///< pixels of one view
-  mesh    ///< vertices, to be looked at from anywhere
+  image,    ///< pixels of one view
+  mesh,     ///< vertices, to be looked at from anywhere
+  clusters  ///< vectors that vertices are put together from (clustered PCA)
 };
 
 /// What a transport is of; kept in its file.
@@ -44,15 +47,21 @@ struct TransportInfo {
   int terms = 1;  ///< outputs a pixel or vertex, >= 1; above 1 each belongs to a term of
                   ///< a factored BRDF
   Camera camera;  ///< the view (of a mesh: the first one)
-  std::shared_ptr<const TransportMesh> mesh;  ///< of kind mesh, else null
+  std::shared_ptr<const TransportMesh> mesh;       ///< null for kind image, else there
+  std::shared_ptr<const ViewFactors> view;         ///< of `terms` terms; null: seen alike from
+                                                   ///< everywhere, and terms is 1
+  std::shared_ptr<const ClusterWeights> clusters;  ///< of kind clusters, else null
   std::string meta;  ///< JSON object: how it was made, its options, measured error
 
-  /// Rows with a meaning: pixels or vertices, times terms. Output `i * terms + k` is term k of
-  /// pixel y * width + x = i, or of vertex i.
+  /// Rows with a meaning: pixels, vertices or vectors of clusters, times terms. Output
+  /// `i * terms + k` is term k of pixel y * width + x = i, of vertex i, or of vector s of cluster
+  /// c, c * basis + s = i.
   std::size_t output_count() const {
     const std::size_t places =
-        mesh ? mesh->position.size()
-             : static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+        clusters ? static_cast<std::size_t>(clusters->clusters) *
+                       static_cast<std::size_t>(clusters->basis)
+        : mesh ? mesh->position.size()
+               : static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
     return places * static_cast<std::size_t>(terms);
   }
 };

@@ -266,6 +266,16 @@ TransportSummary Assembly::run(const Progress& progress) {
     const std::vector<std::byte> mesh = pack_mesh(*info.mesh);
     header.mesh = append(out, mesh.data(), mesh.size());
   }
+  std::vector<NamedSection> named;
+  const auto append_named = [&](const char(&section)[8],
+                                const std::vector<std::byte>& packed_section) {
+    NamedSection& entry = named.emplace_back();
+    std::memcpy(entry.name, section, sizeof section);
+    entry.section = append(out, packed_section.data(), packed_section.size());
+  };
+  if (info.view) append_named(kViewFactorsName, pack_view_factors(*info.view));
+  if (info.clusters) append_named(kClustersName, pack_cluster_weights(*info.clusters));
+  header.named = append(out, named.data(), named.size() * sizeof(NamedSection));
   std::uint64_t chunk_bytes = 0;
   for (const FileSection& section : sections) chunk_bytes += section.size;
   const std::string text = describe(chunk_bytes, summary);
@@ -297,6 +307,8 @@ std::uint64_t transport_overhead_bytes(const TransportInfo& info) {
       packed(rows * (sizeof(std::uint32_t) + sizeof(Rgb)) + info.output_count() * sizeof(float));
   bytes += chunks * column_area_begin(columns);
   if (info.mesh) bytes += pack_mesh(*info.mesh).size();
+  if (info.view) bytes += pack_view_factors(*info.view).size() + sizeof(NamedSection);
+  if (info.clusters) bytes += pack_cluster_weights(*info.clusters).size() + sizeof(NamedSection);
   return bytes;
 }
 
@@ -306,17 +318,32 @@ void check_info(const TransportInfo& info) {
                 fmt::format("picture size is {}x{}, expected 1 to 65536 each way", info.width,
                             info.height));
   }
-  const int most = info.kind == TransportKind::mesh ? kMaxTerms : 1;
+  const bool mesh = info.kind != TransportKind::image;
+  const int most = mesh ? kMaxTerms : 1;
   if (info.terms < 1 || info.terms > most) {
     throw Error(ErrorKind::invalid_argument,
                 fmt::format("{} terms, expected 1 to {}", info.terms, most));
   }
-  if ((info.kind == TransportKind::mesh) != (info.mesh != nullptr)) {
+  if (mesh != (info.mesh != nullptr)) {
     throw Error(ErrorKind::invalid_argument,
                 "a mesh is wanted for the transport of a mesh, and for no other");
   }
-  const std::string wrong = info.mesh ? check_mesh(*info.mesh) : std::string();
-  if (!wrong.empty()) throw Error(ErrorKind::invalid_argument, wrong);
+  if ((info.kind == TransportKind::clusters) != (info.clusters != nullptr)) {
+    throw Error(ErrorKind::invalid_argument,
+                "clusters are wanted for the transport of clusters, and for no other");
+  }
+  if (info.view && (!mesh || info.view->terms != info.terms)) {
+    throw Error(ErrorKind::invalid_argument,
+                fmt::format("view factors have {} terms, expected a mesh of as many, {}",
+                            info.view->terms, info.terms));
+  }
+  const std::size_t vertices = mesh ? info.mesh->position.size() : 0;
+  for (const std::string& wrong :
+       {mesh ? check_mesh(*info.mesh) : std::string(),
+        info.view ? check_view_factors(*info.view, vertices) : std::string(),
+        info.clusters ? check_cluster_weights(*info.clusters, vertices) : std::string()}) {
+    if (!wrong.empty()) throw Error(ErrorKind::invalid_argument, wrong);
+  }
   if (info.output_count() > kMaxOutputs) {
     throw Error(ErrorKind::invalid_argument,
                 fmt::format("{} outputs, expected at most {}", info.output_count(), kMaxOutputs));

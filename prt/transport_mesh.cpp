@@ -3,32 +3,19 @@
 #include "prt/transport_mesh.h"
 
 #include <fmt/format.h>
-#include <zstd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 
 #include "core/error.h"
+#include "prt/packing.h"
 
 namespace haarlight {
 namespace {
 
 bool finite(const std::array<float, 3>& v) {
   return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
-}
-
-template <typename T>
-std::byte* put(std::byte* to, const std::vector<T>& values) {
-  if (!values.empty()) std::memcpy(to, values.data(), values.size() * sizeof(T));
-  return to + values.size() * sizeof(T);
-}
-
-template <typename T>
-const std::byte* take(const std::byte* from, std::vector<T>& values, std::size_t count) {
-  values.resize(count);
-  if (count > 0) std::memcpy(static_cast<void*>(values.data()), from, count * sizeof(T));
-  return from + count * sizeof(T);
 }
 
 std::size_t plain_size(std::size_t vertices, std::size_t triangles, bool materials) {
@@ -89,14 +76,7 @@ std::vector<std::byte> pack_mesh(const TransportMesh& mesh) {
   std::memcpy(plain.data(), origin, sizeof origin);
   put(put(put(put(plain.data() + sizeof origin, mesh.position), mesh.normal), mesh.triangle),
       mesh.material);
-  std::vector<std::byte> packed(ZSTD_compressBound(plain.size()));
-  const std::size_t size =
-      ZSTD_compress(packed.data(), packed.size(), plain.data(), plain.size(), 6);
-  if (ZSTD_isError(size)) {
-    throw Error(ErrorKind::io, fmt::format("zstd: {}", ZSTD_getErrorName(size)));
-  }
-  packed.resize(size);
-  return packed;
+  return compress_bytes(plain);
 }
 
 TransportMesh unpack_mesh(std::span<const std::byte> packed, const MeshCounts& counts,
@@ -104,21 +84,8 @@ TransportMesh unpack_mesh(std::span<const std::byte> packed, const MeshCounts& c
   const auto damaged = [&name](const std::string& what) {
     return Error(ErrorKind::format, fmt::format("{}: {}", name, what));
   };
-  // A frame tells its size before anything is asked for; no mesh packs 256 to 1, so that a crafted
-  // one cannot ask for more than a multiple of what it brings.
   const std::size_t expected = plain_size(counts.vertices, counts.triangles, counts.materials);
-  const unsigned long long told = ZSTD_getFrameContentSize(packed.data(), packed.size());
-  if (told != expected || expected / 256 > packed.size() + (std::size_t{1} << 16)) {
-    throw damaged(fmt::format("mesh of {} bytes does not unpack to {} vertices and {} triangles",
-                              packed.size(), counts.vertices, counts.triangles));
-  }
-  std::vector<std::byte> plain(expected);
-  const std::size_t size =
-      ZSTD_decompress(plain.data(), plain.size(), packed.data(), packed.size());
-  if (ZSTD_isError(size) || size != expected) {
-    throw damaged(fmt::format("mesh does not unpack to {} bytes ({})", expected,
-                              ZSTD_isError(size) ? ZSTD_getErrorName(size) : "another size"));
-  }
+  const std::vector<std::byte> plain = decompress_bytes(packed, expected, expected, name, "mesh");
   TransportMesh mesh;
   double origin[3];
   std::memcpy(origin, plain.data(), sizeof origin);

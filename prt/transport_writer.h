@@ -28,7 +28,10 @@ std::vector<std::uint32_t> image_row_order(int width, int height);
 /// together, again and again; ties go by vertex number.
 std::vector<std::uint32_t> mesh_row_order(const TransportMesh& mesh, int terms = 1);
 
-/// image_row_order or mesh_row_order, by the kind.
+/// Output after output, padded to a whole chunk: for vectors of clusters.
+std::vector<std::uint32_t> plain_row_order(std::size_t outputs);
+
+/// image_row_order, mesh_row_order or plain_row_order, by the kind.
 std::vector<std::uint32_t> row_order(const TransportInfo& info);
 
 /// Tiles up to the last that has a row in use; what follows is padding.

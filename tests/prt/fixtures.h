@@ -192,4 +192,51 @@ inline std::vector<Rgb> random_lighting(const HaarLayout& layout, std::mt19937_6
   return out;
 }
 
+/// T * lighting in long double, one an output.
+inline std::vector<RgbD> product(const std::vector<double>& dense, std::span<const Rgb> lighting) {
+  const std::size_t size = lighting.size();
+  std::vector<RgbD> out(dense.size() / (3 * size));
+  for (std::size_t o = 0; o < out.size(); ++o) {
+    long double sum[3] = {};
+    for (std::size_t j = 0; j < size; ++j) {
+      const float l[3] = {lighting[j].r, lighting[j].g, lighting[j].b};
+      for (std::size_t c = 0; c < 3; ++c) {
+        sum[c] += static_cast<long double>(dense[(3 * o + c) * size + j]) *
+                  static_cast<long double>(l[c]);
+      }
+    }
+    out[o] = {static_cast<double>(sum[0]), static_cast<double>(sum[1]),
+              static_cast<double>(sum[2])};
+  }
+  return out;
+}
+
+/// Random view factors for a mesh of so many vertices: profiles of sines and cosines vanish along
+/// the normal, as those of a smooth function do. The last of the sets has one constant term.
+inline ViewFactors random_view_factors(std::size_t vertices, int terms, std::uint64_t seed,
+                                       int resolution = 9) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  constexpr int kSets = 3;
+  constexpr int kOrders[5] = {0, 1, -1, 5, -4};
+  ViewFactors f;
+  f.terms = terms;
+  f.resolution = resolution;
+  for (int set = 0; set < kSets; ++set) {
+    for (int k = 0; k < terms; ++k) {
+      const bool last = set == kSets - 1;
+      f.order.push_back(last ? 0 : kOrders[(k + set) % 5]);
+      for (int i = 0; i < resolution; ++i) {
+        const Rgb value{uniform(random), uniform(random), uniform(random)};
+        f.profile.push_back(last                            ? Rgb{1, 1, 1} * (k == 0 ? 1.0f : 0.0f)
+                            : i == 0 && f.order.back() != 0 ? Rgb{}
+                                                            : value);
+      }
+    }
+  }
+  for (std::size_t v = 0; v < vertices; ++v)
+    f.set_of.push_back(static_cast<std::uint32_t>(v % kSets));
+  return f;
+}
+
 }  // namespace haarlight::fixtures

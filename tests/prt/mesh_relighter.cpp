@@ -22,26 +22,8 @@
 namespace haarlight {
 namespace {
 
+using fixtures::product;
 using fixtures::SmallTransport;
-
-// T * lighting in long double, one an output.
-std::vector<RgbD> product(const std::vector<double>& dense, std::span<const Rgb> lighting) {
-  const std::size_t size = lighting.size();
-  std::vector<RgbD> out(dense.size() / (3 * size));
-  for (std::size_t o = 0; o < out.size(); ++o) {
-    long double sum[3] = {};
-    for (std::size_t j = 0; j < size; ++j) {
-      const float l[3] = {lighting[j].r, lighting[j].g, lighting[j].b};
-      for (std::size_t c = 0; c < 3; ++c) {
-        sum[c] += static_cast<long double>(dense[(3 * o + c) * size + j]) *
-                  static_cast<long double>(l[c]);
-      }
-    }
-    out[o] = {static_cast<double>(sum[0]), static_cast<double>(sum[1]),
-              static_cast<double>(sum[2])};
-  }
-  return out;
-}
 
 Environment random_environment(std::uint64_t seed) {
   std::mt19937_64 random(seed);

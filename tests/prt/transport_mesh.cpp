@@ -261,11 +261,82 @@ TEST(MeshTransportFile, VersionOneIsStillRead) {
   EXPECT_TRUE(std::ranges::equal(old.coverage(), now.coverage()));
   EXPECT_TRUE(std::ranges::equal(old.column_norms(), now.column_norms()));
 
-  bytes[8] = 3;
+  bytes[8] = 4;
   write_bytes(folder / "new.hlt", bytes);
   const std::string message = refusal(folder / "new.hlt");
-  EXPECT_NE(message.find("version 3"), std::string::npos) << message;
-  EXPECT_NE(message.find("versions 1 to 2"), std::string::npos) << message;
+  EXPECT_NE(message.find("version 4"), std::string::npos) << message;
+  EXPECT_NE(message.find("versions 1 to 3"), std::string::npos) << message;
+}
+
+TEST(MeshTransportFile, VersionTwoIsStillRead) {
+  const TemporaryFolder folder;
+  const SmallTransport small =
+      fixtures::small_mesh_transport(4, fixtures::bumpy_sphere(100, 8), 8, 2);
+  write_file(small, folder / "a.hlt");
+  // A header of version 2 is that of version 3 up to the hash, which stood where `named` stands.
+  std::vector<char> bytes = bytes_of(folder / "a.hlt");
+  const std::uint32_t version = 2;
+  std::memcpy(bytes.data() + 8, &version, sizeof version);
+  std::memset(bytes.data() + kTransportHeader2Hash, 0,
+              sizeof(TransportHeader) - kTransportHeader2Hash);
+  const std::uint64_t hash = XXH3_64bits(bytes.data(), kTransportHeader2Hash);
+  std::memcpy(bytes.data() + kTransportHeader2Hash, &hash, sizeof hash);
+  write_bytes(folder / "old.hlt", bytes);
+  const Transport now = Transport::open(folder / "a.hlt"),
+                  old = Transport::open(folder / "old.hlt");
+  EXPECT_EQ(old.kind(), TransportKind::mesh);
+  EXPECT_EQ(old.info().terms, 2);
+  EXPECT_EQ(old.info().view, nullptr);
+  expect_same_mesh(*old.info().mesh, *now.info().mesh);
+  EXPECT_TRUE(std::ranges::equal(old.row_output(), now.row_output()));
+  EXPECT_TRUE(std::ranges::equal(old.column_norms(), now.column_norms()));
+}
+
+TEST(MeshTransportFile, SectionsOfUnknownNameArePassedOver) {
+  const TemporaryFolder folder;
+  SmallTransport small = fixtures::small_mesh_transport(4, fixtures::bumpy_sphere(100, 8), 8, 2);
+  small.info.view = std::make_shared<const ViewFactors>(
+      fixtures::random_view_factors(small.info.mesh->position.size(), 2, 8));
+  write_file(small, folder / "a.hlt");
+  const std::vector<char> right = bytes_of(folder / "a.hlt");
+  const TransportHeader header = header_of(right);
+  ASSERT_EQ(header.named.size, sizeof(NamedSection));
+  NamedSection entry;
+  std::memcpy(&entry, right.data() + header.named.offset, sizeof entry);
+  // Writes the table anew, with the right hashes.
+  const auto with_table = [&](const std::vector<NamedSection>& table) {
+    std::vector<char> bytes = right;
+    TransportHeader changed = header;
+    changed.named = {bytes.size(), table.size() * sizeof(NamedSection),
+                     XXH3_64bits(table.data(), table.size() * sizeof(NamedSection))};
+    bytes.resize(bytes.size() + changed.named.size);
+    std::memcpy(bytes.data() + changed.named.offset, table.data(), changed.named.size);
+    changed.file_size = bytes.size();
+    rehash(bytes, changed);
+    write_bytes(folder / "b.hlt", bytes);
+  };
+  NamedSection unknown = entry;
+  std::memcpy(unknown.name, "tomorrow", 8);
+  with_table({unknown, entry});
+  EXPECT_EQ(*Transport::open(folder / "b.hlt").info().view, *small.info.view);
+  with_table({unknown});
+  EXPECT_EQ(Transport::open(folder / "b.hlt").info().view, nullptr);
+  with_table({entry, entry});
+  EXPECT_NE(refusal(folder / "b.hlt").find("twice"), std::string::npos);
+  NamedSection clusters = entry;
+  std::memcpy(clusters.name, kClustersName, 8);
+  with_table({clusters});
+  refusal(folder / "b.hlt");
+  NamedSection outside = unknown;
+  outside.section.size = ~std::uint64_t{0};
+  with_table({outside});
+  EXPECT_NE(refusal(folder / "b.hlt").find("past the file's end"), std::string::npos);
+  NamedSection damaged = unknown;
+  damaged.section.hash ^= 1;
+  with_table({damaged});
+  EXPECT_NE(refusal(folder / "b.hlt").find("damaged"), std::string::npos);
+  with_table(std::vector<NamedSection>(65, unknown));
+  EXPECT_NE(refusal(folder / "b.hlt").find("wrong size"), std::string::npos);
 }
 
 TEST(MeshTransportFile, DamageIsATypedError) {
@@ -306,6 +377,7 @@ TEST(MeshTransportFile, DamageIsATypedError) {
   crafted([](TransportHeader& h) { h.terms = 0xffffffffu; });
   crafted([](TransportHeader& h) { h.kind = 0; });
   crafted([](TransportHeader& h) { h.kind = 2; });
+  crafted([](TransportHeader& h) { h.kind = 3; });
   crafted([](TransportHeader& h) { h.mesh.size = ~std::uint64_t{0}; });
 }
 
