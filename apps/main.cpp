@@ -13,6 +13,7 @@
 #include "apps/option_parsers.h"
 #include "apps/verbs.h"
 #include "core/error.h"
+#include "core/float_check.h"
 
 namespace {
 
@@ -74,6 +75,7 @@ int main(int argc, char** argv) {
   add("info", "Checks a transport file and says what is in it", haarlight::add_info);
 
   try {
+    haarlight::check_float_arithmetic();
     if (argc > 1 && argv[1][0] != '-' && verbs.find(argv[1]) == verbs.end()) {
       return fail(kWrongCommandLine, fmt::format("unknown verb '{}', expected one of {}", argv[1],
                                                  haarlight::join_words(names, ", ")));

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/float_check.h"
 #include "core/image_io.h"
 #include "data_gen/environments.h"
 #include "data_gen/mesh_writer.h"
@@ -148,6 +149,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   try {
+    haarlight::check_float_arithmetic();
     return haarlight::data_gen::run(argc, argv);
   } catch (const std::exception& error) {
     fmt::print(stderr, "haarlight-data: {}\n", error.what());

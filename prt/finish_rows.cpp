@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <functional>
 
+#include "core/denormals.h"
 #include "core/error.h"
 #include "core/parallel.h"
 #include "prt/apply_kernel.h"
@@ -27,6 +28,7 @@ double milliseconds(Clock::duration duration) {
 // Rows of a chunk, coloured, to their outputs.
 void finish_chunk(const Transport& transport, int chunk, const double* totals,
                   std::span<Rgb> outputs) {
+  const FlushDenormals flush;
   const std::size_t first = static_cast<std::size_t>(chunk) * kChunkRows;
   const std::uint32_t* output = transport.row_output().data() + first;
   const Rgb* color = transport.row_color().data() + first;

@@ -14,7 +14,14 @@
 namespace haarlight {
 namespace {
 
-constexpr float kLargestRadiance = 1.8e18f;  // its square is still a float
+// Of a texel (see wavelet/environment.h); a scaling function sums n^2 of them over n.
+constexpr float kLargestRadiance = 1.8e18f;
+// What is less is taken as zero: 2^-100. Floats from there on are multiples of 2^-123, so that
+// their differences are no denormals, which are slow, and no two of them differ without a
+// difference.
+constexpr float kLeastCoefficient = 0x1p-100f;
+
+float without_traces(float c) { return std::abs(c) < kLeastCoefficient ? 0.0f : c; }
 
 constexpr std::pair<LightingMethod, const char*> kMethodNames[] = {
     {LightingMethod::nwa, "nwa"},
@@ -76,6 +83,7 @@ LightingTracker::LightingTracker(const HaarLayout& layout, LightingOptions optio
     : layout_(layout) {
   set_options(std::move(options));
   const auto size = static_cast<std::size_t>(layout.size());
+  target_.resize(size);
   shown_.resize(size);
   emitted_.resize(size);
   keep_key_.resize(size);
@@ -90,24 +98,26 @@ void LightingTracker::set_options(LightingOptions options) {
   options_ = std::move(options);
 }
 
-void LightingTracker::check_target(std::span<const Rgb> target) const {
+std::span<const Rgb> LightingTracker::take_in(std::span<const Rgb> target) {
   if (target.size() != static_cast<std::size_t>(layout_.size())) {
     throw Error(
         ErrorKind::invalid_argument,
         fmt::format("target lighting has {} coefficients, expected {} (6*{}*{})", target.size(),
                     layout_.size(), layout_.face_size(), layout_.face_size()));
   }
+  const float largest = kLargestRadiance * static_cast<float>(layout_.face_size());
   for (std::size_t i = 0; i < target.size(); ++i) {
-    // One comparison catches NaN, infinity and size.
     const Rgb& c = target[i];
-    if (!(std::max({std::abs(c.r), std::abs(c.g), std::abs(c.b)}) <= kLargestRadiance) ||
-        !is_finite(c)) {
+    // NaN compares false.
+    if (!(std::abs(c.r) <= largest && std::abs(c.g) <= largest && std::abs(c.b) <= largest)) {
       throw Error(ErrorKind::invalid_argument,
                   fmt::format("target lighting coefficient {} is ({}, {}, {}), expected finite "
                               "values up to {}",
-                              i, c.r, c.g, c.b, kLargestRadiance));
+                              i, c.r, c.g, c.b, largest));
     }
+    target_[i] = {without_traces(c.r), without_traces(c.g), without_traces(c.b)};
   }
+  return target_;
 }
 
 // Keys and band norms of keeping and of resetting, in one pass over the lighting.
@@ -199,8 +209,8 @@ void LightingTracker::show(std::span<const Rgb> target, int index) {
   shown_[k] = target[k];
 }
 
-const LightingUpdate& LightingTracker::advance(std::span<const Rgb> target) {
-  check_target(target);
+const LightingUpdate& LightingTracker::advance(std::span<const Rgb> wanted) {
+  const std::span<const Rgb> target = take_in(wanted);
   update_.reset.reset();
   update_.deltas.clear();
 
@@ -239,8 +249,8 @@ const LightingUpdate& LightingTracker::advance(std::span<const Rgb> target) {
   return update_;
 }
 
-const LightingUpdate& LightingTracker::start_exact(std::span<const Rgb> target) {
-  check_target(target);
+const LightingUpdate& LightingTracker::start_exact(std::span<const Rgb> wanted) {
+  const std::span<const Rgb> target = take_in(wanted);
   update_.reset.reset();
   update_.deltas.clear();
   for (int b = 0; b < layout_.band_count(); ++b) update_.reset[static_cast<std::size_t>(b)] = true;

@@ -63,8 +63,9 @@ class LightingTracker {
   LightingTracker(const HaarLayout& layout, LightingOptions options);
 
   /// The update for the next frame; valid until the next call (its memory is reused). `target` is
-  /// layout.size() coefficients, all finite, magnitude up to 1.8e18; otherwise throws
-  /// Error{invalid_argument} and leaves the tracker as it was. O(size()); no heap use once warm.
+  /// layout.size() coefficients, all finite, magnitude up to 1.8e18 * face_size (what a sky of the
+  /// largest radiance has); otherwise throws Error{invalid_argument} and leaves the tracker as it
+  /// was. Magnitudes below 2^-100 are taken as zero. O(size()); no heap use once warm.
   const LightingUpdate& advance(std::span<const Rgb> target);
 
   /// Shows `target` in full, as at the start of a sequence (Overbeck 2006, section 3, sets
@@ -80,7 +81,7 @@ class LightingTracker {
   std::span<const Rgb> shown() const { return shown_; }
 
  private:
-  void check_target(std::span<const Rgb> target) const;
+  std::span<const Rgb> take_in(std::span<const Rgb> target);
   void rank(std::span<const Rgb> target);
   BandMask choose_bands_simply() const;
   BandMask choose_bands_exhaustively();
@@ -89,6 +90,7 @@ class LightingTracker {
   HaarLayout layout_;
   LightingOptions options_;
   std::vector<float> weights_;
+  std::vector<Rgb> target_;  // of the frame, checked
   std::vector<Rgb> shown_;
   std::vector<RgbD>
       emitted_;  // sum of all deltas since the band was last reset, as consumers have it

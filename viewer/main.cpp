@@ -13,6 +13,7 @@
 #include <string>
 
 #include "core/error.h"
+#include "core/float_check.h"
 #include "core/parallel.h"
 #include "viewer/headless.h"
 #include "viewer/run_options.h"
@@ -212,6 +213,7 @@ int main(int argc, char** argv) {
   CommandLine command;
   add_options(app, command);
   try {
+    check_float_arithmetic();
     app.parse(argc, argv);
     finish_options(command);
     return run(command);

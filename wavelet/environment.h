@@ -62,7 +62,8 @@ Environment load_environment(const std::filesystem::path& file,
 /// would move a bright light. A cell holds energy (radiance x solid angle), solid angle and centre.
 /// project() turns every cell and hands its energy to the texels below its footprint, across face
 /// edges too, then divides by the solid angle that arrived in the same way where light is smooth,
-/// and by the texel's where it is not. So a constant environment stays constant, a light of one
+/// and by the texel's where it is not. What all directions have at least is left out of that and
+/// added at the end. So a constant environment stays constant to the bit, a light of one
 /// pixel keeps its energy within 2 % however it is turned, moves smoothly, and neither vanishes nor
 /// flickers. 32 bytes a cell.
 class EnvironmentSampler {
@@ -93,7 +94,8 @@ class EnvironmentSampler {
   int parts_ = 0;                         // runs that the cells are cut in, whatever the threads
   std::vector<float> x_, y_, z_;          // unit direction of a cell's centre
   std::vector<float> width_;              // of a cell, in texels at the middle of a face
-  std::vector<Sums> light_;               // what a cell carries
+  Rgb everywhere_;                        // radiance that all directions have at least
+  std::vector<Sums> light_;               // what a cell carries beside that
   std::vector<float> texel_solid_angle_;  // of one face, exact
   mutable std::vector<Sums> scratch_;     // [part][texel]
 };

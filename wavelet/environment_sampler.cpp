@@ -6,7 +6,10 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
+#include <utility>
 
+#include "core/denormals.h"
 #include "core/error.h"
 #include "core/parallel.h"
 #include "wavelet/environment.h"
@@ -101,6 +104,35 @@ void place(const RotationF& turn, const float* __restrict px, const float* __res
   }
 }
 
+/// The least of each channel over the pixels that carry light.
+Rgb darkest(const Environment& environment) {
+  const Image& picture = environment.picture();
+  constexpr float kMost = std::numeric_limits<float>::max();
+  Rgb least{kMost, kMost, kMost};
+  for (int y = 0; y < picture.height; ++y) {
+    for (int x = 0; x < picture.width; ++x) {
+      const Rgb& p = picture.at(x, y);
+      if (!(p.r < least.r) && !(p.g < least.g) && !(p.b < least.b)) continue;
+      if (!projection_direction(environment.projection(), (x + 0.5) / picture.width,
+                                (y + 0.5) / picture.height)) {
+        continue;
+      }
+      least = {std::min(least.r, p.r), std::min(least.g, p.g), std::min(least.b, p.b)};
+    }
+  }
+  return least.r < kMost ? least : Rgb{};
+}
+
+/// The environment less `everywhere`, where it has that much.
+Environment rest_of(const Environment& environment, const Rgb& everywhere) {
+  Image picture = environment.picture();
+  for (Rgb& p : picture.pixels) {
+    p -= everywhere;
+    p = {std::max(p.r, 0.0f), std::max(p.g, 0.0f), std::max(p.b, 0.0f)};
+  }
+  return Environment(std::move(picture), {.projection = environment.projection(), .scale = 1});
+}
+
 }  // namespace
 
 EnvironmentSampler::EnvironmentSampler(const Environment& environment, int face_size)
@@ -119,8 +151,12 @@ EnvironmentSampler::EnvironmentSampler(const Environment& environment, int face_
             static_cast<double>(environment.picture().pixels.size());
   }
   const double texel = 4 * kPi / texels;
+  // Light that comes from everywhere alike is added at the end instead of being turned: so a
+  // constant sky is constant to the last bit, and no wavelet is spent on roundings.
+  everywhere_ = darkest(environment);
   const std::vector<EnvironmentCell> cells =
-      cut_into_cells(environment, 4 * kPi / wanted, kBlurShare * mean * texel * std::sqrt(texel));
+      cut_into_cells(rest_of(environment, everywhere_), 4 * kPi / wanted,
+                     kBlurShare * mean * texel * std::sqrt(texel));
 
   for (const EnvironmentCell& cell : cells) {
     x_.push_back(static_cast<float>(cell.center.x));
@@ -140,6 +176,7 @@ EnvironmentSampler::EnvironmentSampler(const Environment& environment, int face_
 }
 
 void EnvironmentSampler::add_part(const Rotation& rotation, int part) const {
+  const FlushDenormals flush;
   const auto n = static_cast<std::size_t>(n_);
   Sums* const sums = scratch_.data() + static_cast<std::size_t>(part) * part_stride();
   std::fill(sums, sums + part_stride(), Sums{});
@@ -242,6 +279,7 @@ void EnvironmentSampler::project(const Rotation& rotation, Cubemap& out) const {
   Sums* const means = scratch_.data() + part_stride();
   const int rows_at_once = std::max(1, kTexelsAtOnce / n_);
   const auto sum_parts = [&](int row) {
+    const FlushDenormals flush;
     const std::size_t first = static_cast<std::size_t>(row) * n;
     for (std::size_t texel = first; texel < first + n; ++texel) {
       typedef double DoubleSums __attribute__((vector_size(32)));
@@ -263,6 +301,7 @@ void EnvironmentSampler::project(const Rotation& rotation, Cubemap& out) const {
   // 3 x 3 texels around, which a light has above it, is taken as smooth and the rest as light:
   //   radiance = c + (energy - c * arrived) / exact
   const auto finish_row = [&](int row) {
+    const FlushDenormals flush;
     const int face = row / n_, y = row % n_;
     for (int x = 0; x < n_; ++x) {
       const std::size_t texel = cube_index(face, x, y, n_);
@@ -277,8 +316,9 @@ void EnvironmentSampler::project(const Rotation& rotation, Cubemap& out) const {
       const float exact = texel_solid_angle_[texel % (n * n)];
       const Sums radiance = least + (sum - least * sum[3]) * (1 / exact);
       // Rounding alone could leave a hair below nothing.
-      out.texels[texel] = {std::max(radiance[0], 0.0f), std::max(radiance[1], 0.0f),
-                           std::max(radiance[2], 0.0f)};
+      out.texels[texel] =
+          everywhere_ + Rgb(std::max(radiance[0], 0.0f), std::max(radiance[1], 0.0f),
+                            std::max(radiance[2], 0.0f));
     }
   };
   parallel_for(6 * n_, finish_row, rows_at_once);

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "core/denormals.h"
 #include "core/error.h"
 #include "core/simd.h"
 
@@ -194,6 +195,7 @@ void haar_forward(const HaarLayout& layout, std::span<const double> texels,
 void haar_forward(const HaarLayout& layout, std::span<const Rgb> texels,
                   std::span<Rgb> coefficients) {
   check_lengths(layout, texels, coefficients);
+  const FlushDenormals flush;
   by_channel(texels, coefficients,
              [&](const double* in, double* out) { forward_faces(layout.face_size(), in, out); });
 }

@@ -60,7 +60,7 @@ class HaarLayout {
 ///
 /// Spans must not overlap. No heap use after the first call on a thread at a size. Throws
 /// Error{invalid_argument} on a length that is not layout.size(). Light (Rgb) is transformed in
-/// double and rounded once, since a bright sun beside a dark texel cancels.
+/// double and rounded once, since a bright sun beside a dark texel cancels; denormals count as 0.
 /// Source: the nonstandard 2D Haar basis on cube faces as in Ng, Ramamoorthi and Hanrahan 2003;
 /// the orthonormal scaling is ours.
 void haar_forward(const HaarLayout& layout, std::span<const float> texels,

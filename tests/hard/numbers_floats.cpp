@@ -1,0 +1,118 @@
+// Rows 9 and 50: denormals cost no time, and arithmetic that has been tampered with is noticed.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <vector>
+
+#if defined(__SSE__)
+#include <xmmintrin.h>
+#endif
+
+#include "core/denormals.h"
+#include "core/error.h"
+#include "core/float_check.h"
+#include "prt/image_relighter.h"
+#include "prt/motion.h"
+#include "tests/hard/hard_case.h"
+#include "tests/hard/oracle.h"
+
+namespace haarlight {
+namespace {
+
+using namespace hard;
+
+// Frames of a turning sky of `scale` times some texture, from its cells to pixels; the least
+// seconds of several runs, so that what else the machine does counts little.
+class TurningSky {
+ public:
+  TurningSky(const Transport& transport, double scale, float dark)
+      : relighter_(transport), tracker_(transport.layout(), options_of(LightingMethod::pbi, 30)) {
+    Image sky(64, 32);
+    for (std::size_t i = 0; i < sky.pixels.size(); ++i) {
+      const auto value = static_cast<float>(scale * static_cast<double>(i * 2654435761u % 1000));
+      sky.pixels[i] = i % 3 ? Rgb{value, dark, value} : Rgb{dark, dark, dark};
+    }
+    motion_.emplace(MotionOptions{.kind = MotionKind::rotate, .degrees = 90, .stop = 1000000},
+                    transport.layout(), Environment(sky));
+  }
+  double seconds(int frames) {
+    const auto begin = std::chrono::steady_clock::now();
+    for (int i = 0; i < frames; ++i) {
+      relighter_.apply(tracker_.advance(motion_->coefficients(frame_ += 1000)));
+    }
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  }
+
+ private:
+  ImageRelighter relighter_;
+  LightingTracker tracker_;
+  std::optional<Motion> motion_;
+  int frame_ = 0;
+};
+
+TEST(HardCases, Row09_Denormals) {
+  property("a frame of denormal light, or of traces beside light, takes at most 1.2 times as long");
+  fixtures::SmallTransport small = fixtures::small_transport(16, 128, 128, 31, 0.5);
+  const Transport transport = build_transport(small.info, small.tiles, small.thresholds);
+  TurningSky normal(transport, 1, 0.5f);
+  struct Case {
+    const char* name;
+    double scale;
+    float dark;
+  };
+  // Whole skies below 1.2e-38; some whose products with transport are; traces beside real light.
+  for (const Case& c : {Case{"denormal sky", 1e-43, 1e-44f}, Case{"1e-33 sky", 1e-36, 1e-36f},
+                        Case{"denormals beside light", 1, 3e-39f}}) {
+    TurningSky sky(transport, c.scale, c.dark);
+    double ratio = HUGE_VAL;
+    for (int round = 0; round < 12 && ratio > 1.1; ++round) {
+      double plain = HUGE_VAL, traces = HUGE_VAL;
+      for (int run = 0; run < 7; ++run) {
+        plain = std::min(plain, normal.seconds(4));
+        traces = std::min(traces, sky.seconds(4));
+      }
+      ratio = std::min(ratio, traces / plain);
+    }
+    at_most(std::string(c.name) + ": time of a normal one", ratio, 1.2);
+  }
+}
+
+TEST(HardCases, Row50_FastMathIsNoticed) {
+  property("programs refuse to start where denormals, NaN or rounding are not those of IEEE 754");
+  double unnoticed = 0, refused = 0;
+  try {
+    check_float_arithmetic();
+  } catch (const Error& error) {
+    ++refused;
+    ADD_FAILURE() << error.what();
+  }
+#if defined(__SSE__)
+  // What a library built with fast-math does when it is loaded, and other roundings.
+  const unsigned before = _mm_getcsr();
+  for (const unsigned bits : {0x8000u, 0x0040u, 0x8040u, 0x2000u, 0x4000u, 0x6000u}) {
+    _mm_setcsr(before | bits);
+    bool noticed = false;
+    try {
+      check_float_arithmetic();
+    } catch (const Error&) {
+      noticed = true;
+    }
+    _mm_setcsr(before);
+    unnoticed += !noticed;
+  }
+  { const FlushDenormals flush; }
+  unnoticed += _mm_getcsr() != before;  // the guard gives back what was set
+#endif
+  volatile float nan = std::nanf("");
+  unnoticed += !std::isnan(nan);
+  at_most("settings not noticed", unnoticed, 0);
+  at_most("plain arithmetic refused", refused, 0);
+}
+
+}  // namespace
+}  // namespace haarlight

@@ -1,0 +1,23 @@
+# Hard cases: one binary a group of rows, so that a planted fault (planted.py) relinks one of them.
+# Each test leaves a report in HARD_CASES_FOLDER, from which stability_table.py makes a table.
+set(HARD_CASES_FOLDER ${CMAKE_BINARY_DIR}/hard_cases)
+
+# haarlight_hard_test(GROUP SOURCES... USES ...): binary test_hard_GROUP of tests/hard/SOURCES.cpp.
+function(haarlight_hard_test group)
+  cmake_parse_arguments(ARG "" "" "SOURCES;USES" ${ARGN})
+  list(TRANSFORM ARG_SOURCES PREPEND hard/)
+  list(TRANSFORM ARG_SOURCES APPEND .cpp)
+  add_executable(test_hard_${group} ${ARG_SOURCES})
+  target_link_libraries(test_hard_${group} PRIVATE ${ARG_USES} haarlight_flags fmt::fmt
+    GTest::gtest_main)
+  target_include_directories(test_hard_${group} PRIVATE ${PROJECT_SOURCE_DIR})
+  gtest_discover_tests(test_hard_${group} DISCOVERY_TIMEOUT 60 XML_OUTPUT_DIR ${HARD_CASES_FOLDER}
+    PROPERTIES LABELS hard TIMEOUT 600 FIXTURES_SETUP hard_cases)
+endfunction()
+
+haarlight_hard_test(numbers SOURCES numbers_lighting numbers_basis numbers_floats USES haarlight_prt)
+
+find_package(Python3 REQUIRED COMPONENTS Interpreter)
+add_test(NAME HardCases.PlantedFaultsFitTheTree
+  COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_LIST_DIR}/planted.py --apply-only)
+set_tests_properties(HardCases.PlantedFaultsFitTheTree PROPERTIES LABELS hard TIMEOUT 60)
