@@ -1,21 +1,20 @@
-// Reading transport files: mapping, checking every byte, and access to columns.
+// Reading transport files: checking every byte, and access to columns.
 
 #include "prt/transport.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
 #include <unistd.h>
 #include <xxhash.h>
+#include <zstd.h>
 
 #include <algorithm>
 #include <bit>
-#include <cerrno>
 #include <cmath>
 #include <cstring>
 
 #include "core/error.h"
+#include "core/huge_page_vector.h"
+#include "core/input_file.h"
 #include "core/parallel.h"
 #include "prt/chunk.h"
 #include "prt/transport_data.h"
@@ -25,43 +24,32 @@
 namespace haarlight {
 namespace {
 
-class Mapping {
+/// Memory of the chunks, in huge pages. Nothing is written to it before it is read into: pages go
+/// to the node of the thread that reads them.
+class ChunkMemory {
  public:
-  explicit Mapping(const std::filesystem::path& file) {
-    const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
-    if (descriptor < 0) {
-      const int reason = errno;
-      throw Error(reason == ENOENT ? ErrorKind::missing : ErrorKind::io,
-                  fmt::format("{}: {}", file.string(), std::strerror(reason)));
+  ChunkMemory(std::size_t size, const std::string& name) : size_(size) {
+    // The system grants more than there is, and kills whoever uses it.
+    const auto pages = static_cast<std::uint64_t>(std::max(0L, ::sysconf(_SC_PHYS_PAGES)));
+    const auto page = static_cast<std::uint64_t>(std::max(0L, ::sysconf(_SC_PAGESIZE)));
+    if (size > pages * page) {
+      throw Error(ErrorKind::io, fmt::format("{}: needs {} bytes of memory, this machine has {}",
+                                             name, size, pages * page));
     }
-    struct stat status {};
-    const bool known = ::fstat(descriptor, &status) == 0;
-    if (!known || !S_ISREG(status.st_mode)) {
-      ::close(descriptor);
-      throw Error(ErrorKind::io, fmt::format("{}: not a plain file", file.string()));
-    }
-    size_ = static_cast<std::size_t>(status.st_size);
-    if (size_ > 0) {
-      data_ = ::mmap(nullptr, size_, PROT_READ, MAP_SHARED, descriptor, 0);
-    }
-    const int reason = errno;
-    ::close(descriptor);
-    if (data_ == MAP_FAILED) {
-      data_ = nullptr;
-      throw Error(ErrorKind::io,
-                  fmt::format("{}: cannot be mapped: {}", file.string(), std::strerror(reason)));
-    }
+    if (size > 0) data_ = HugePageAllocator<std::byte>().allocate(size);
   }
-  ~Mapping() {
-    if (data_) ::munmap(data_, size_);
+  ~ChunkMemory() {
+    if (data_) HugePageAllocator<std::byte>().deallocate(data_, size_);
   }
-  Mapping(const Mapping&) = delete;
-  Mapping& operator=(const Mapping&) = delete;
+  ChunkMemory(const ChunkMemory&) = delete;
+  ChunkMemory& operator=(const ChunkMemory&) = delete;
 
-  std::span<const std::byte> bytes() const { return {static_cast<const std::byte*>(data_), size_}; }
+  std::span<std::byte> part(std::size_t offset, std::size_t size) const {
+    return {data_ + offset, size};
+  }
 
  private:
-  void* data_ = nullptr;
+  std::byte* data_ = nullptr;
   std::size_t size_ = 0;
 };
 
@@ -69,23 +57,44 @@ class Mapping {
   throw Error(ErrorKind::format, fmt::format("{}: {}", name, what));
 }
 
-// The bytes of a section, inside the file and with the right hash.
-std::span<const std::byte> section_bytes(std::span<const std::byte> file,
-                                         const FileSection& section, const std::string& name,
-                                         const std::string& what) {
+// Reads a section into `bytes`, which has its size, and compares its hash.
+void read_section(const InputFile& file, const FileSection& section, std::span<std::byte> bytes,
+                  const std::string& name, const std::string& what) {
+  file.read(section.offset, bytes);
+  if (XXH3_64bits(bytes.data(), bytes.size()) != section.hash) {
+    damaged(name, fmt::format("{} is damaged (checksum differs)", what));
+  }
+}
+
+void check_place(const InputFile& file, const FileSection& section, const std::string& name,
+                 const std::string& what) {
   if (section.offset > file.size() || section.size > file.size() - section.offset) {
     damaged(name, fmt::format("{} at byte {} of {} bytes, past the file's end at {}", what,
                               section.offset, section.size, file.size()));
   }
-  const auto bytes = file.subspan(section.offset, section.size);
-  if (XXH3_64bits(bytes.data(), bytes.size()) != section.hash) {
-    damaged(name, fmt::format("{} is damaged (checksum differs)", what));
+}
+
+/// Room for the description.
+constexpr std::uint64_t kMaxMetaBytes = std::uint64_t{64} << 20;
+
+// The bytes of a section, inside the file, of at most `most` bytes and with the right hash.
+std::vector<std::byte> section_bytes(const InputFile& file, const FileSection& section,
+                                     const std::string& name, const std::string& what,
+                                     std::uint64_t most) {
+  check_place(file, section, name, what);
+  if (section.size > most) {
+    damaged(name, fmt::format("{} has the wrong size: {} bytes, expected at most {}", what,
+                              section.size, most));
   }
+  std::vector<std::byte> bytes(section.size);
+  read_section(file, section, bytes, name, what);
   return bytes;
 }
 
-TransportHeader read_header(std::span<const std::byte> file, const std::string& name) {
+TransportHeader read_header(const InputFile& input, const std::string& name) {
   TransportHeader header;
+  std::vector<std::byte> file(std::min<std::uint64_t>(input.size(), sizeof header));
+  input.read(0, file);
   if (file.size() < sizeof header.magic ||
       std::memcmp(file.data(), kTransportMagic, sizeof kTransportMagic) != 0) {
     damaged(name, "not a Haarlight transport file");
@@ -111,8 +120,8 @@ TransportHeader read_header(std::span<const std::byte> file, const std::string& 
     damaged(name, "header is damaged (checksum differs)");
   }
   if (first) header.terms = 1;
-  if (header.file_size != file.size()) {
-    damaged(name, fmt::format("{} bytes, expected {}: the file was cut short or grew", file.size(),
+  if (header.file_size != input.size()) {
+    damaged(name, fmt::format("{} bytes, expected {}: the file was cut short or grew", input.size(),
                               header.file_size));
   }
   return header;
@@ -174,14 +183,13 @@ void check_shape(const TransportHeader& header, const std::string& name) {
 }
 
 // View factors and clusters, where the file has them.
-void read_named(std::span<const std::byte> bytes, const TransportHeader& header,
-                const std::string& name, TransportInfo& info) {
+void read_named(const InputFile& input, const TransportHeader& header, const std::string& name,
+                TransportInfo& info) {
   if (header.version < 3) return;
-  const auto table = section_bytes(bytes, header.named, name, "table of sections");
   constexpr std::size_t kEntry = sizeof(NamedSection);
-  if (table.size() % kEntry != 0 || table.size() / kEntry > kMostNamedSections) {
-    damaged(name, "table of sections has the wrong size");
-  }
+  const auto table =
+      section_bytes(input, header.named, name, "table of sections", kEntry * kMostNamedSections);
+  if (table.size() % kEntry != 0) damaged(name, "table of sections has the wrong size");
   const std::size_t vertices = info.mesh ? info.mesh->position.size() : 0;
   for (std::size_t at = 0; at < table.size(); at += kEntry) {
     NamedSection entry;
@@ -190,10 +198,11 @@ void read_named(std::span<const std::byte> bytes, const TransportHeader& header,
       return std::memcmp(entry.name, wanted, sizeof wanted) == 0;
     };
     const bool view = is(kViewFactorsName), clusters = is(kClustersName);
-    const auto section = section_bytes(bytes, entry.section, name,
+    const auto section = section_bytes(input, entry.section, name,
                                        view       ? "view factors"
                                        : clusters ? "clusters"
-                                                  : "a section of unknown name");
+                                                  : "a section of unknown name",
+                                       input.size());
     if ((view && info.view) || (clusters && info.clusters)) {
       damaged(name, "a section is there twice");
     }
@@ -213,38 +222,72 @@ void read_named(std::span<const std::byte> bytes, const TransportHeader& header,
   }
 }
 
+void check_camera(const TransportHeader& header, const std::string& name) {
+  double sum = 0;  // not finite if one of them is not
+  for (const double x : header.camera_position) sum += 0 * x;
+  for (const double x : header.camera_orientation) sum += 0 * x;
+  if (sum != 0 || !(header.camera_vertical_fov > 0 && header.camera_vertical_fov < kPi)) {
+    damaged(name, "the camera has numbers that are not finite, or no angle of view from 0 to pi");
+  }
+}
+
+// Chunks follow each other, so that a crafted table can ask for no more work than the file has
+// bytes.
+std::vector<FileSection> read_chunk_table(const InputFile& input, const TransportHeader& header,
+                                          const std::string& name) {
+  std::vector<FileSection> sections(header.chunk_count);
+  const std::size_t size = sizeof(FileSection) * sections.size();
+  const auto table = section_bytes(input, header.chunk_table, name, "chunk table", size);
+  if (table.size() != size) damaged(name, "chunk table has the wrong size");
+  if (size > 0) std::memcpy(sections.data(), table.data(), size);
+  std::uint64_t end = 0;
+  for (std::size_t c = 0; c < sections.size(); ++c) {
+    const std::string what = fmt::format("chunk {}", c);
+    check_place(input, sections[c], name, what);
+    if (sections[c].offset % kChunkAlignment != 0 || sections[c].offset < end) {
+      damaged(name, fmt::format("{} at byte {}, expected a multiple of {} from {} on", what,
+                                sections[c].offset, kChunkAlignment, end));
+    }
+    end = sections[c].offset + sections[c].size;
+  }
+  return sections;
+}
+
 }  // namespace
 
 Transport Transport::open(const std::filesystem::path& file) {
   const std::string name = file.string();
-  const auto mapping = std::make_shared<const Mapping>(file);
-  const std::span<const std::byte> bytes = mapping->bytes();
+  const InputFile input(file);
 
-  const TransportHeader header = read_header(bytes, name);
+  // Small things first: whatever is wrong is found before the chunks cost time or memory.
+  const TransportHeader header = read_header(input, name);
   check_shape(header, name);
+  check_camera(header, name);
   auto data = std::make_shared<Data>(static_cast<int>(header.face_size));
-  data->info = info_of(header, section_bytes(bytes, header.meta, name, "description"));
+  data->info =
+      info_of(header, section_bytes(input, header.meta, name, "description", kMaxMetaBytes));
+  const std::vector<FileSection> sections = read_chunk_table(input, header, name);
   if (header.kind > 0) {
     data->info.mesh = std::make_shared<const TransportMesh>(
-        unpack_mesh(section_bytes(bytes, header.mesh, name, "mesh"),
+        unpack_mesh(section_bytes(input, header.mesh, name, "mesh", input.size()),
                     {header.vertices, header.triangles, header.mesh_materials == 1}, name));
   }
-  read_named(bytes, header, name, data->info);
-  data->storage = mapping;
-  data->file_bytes = bytes.size();
+  read_named(input, header, name, data->info);
+  data->file_bytes = input.size();
 
   const auto columns = static_cast<std::size_t>(data->layout.size());
   const std::size_t rows = static_cast<std::size_t>(header.chunk_count) * kChunkRows;
   if (data->info.output_count() > rows) {
     damaged(name, fmt::format("{} outputs do not fit {} rows", data->info.output_count(), rows));
   }
-  RowTables tables = unpack_tables(section_bytes(bytes, header.rows, name, "row tables"), rows,
-                                   data->info.output_count(), name);
+  RowTables tables = unpack_tables(
+      section_bytes(input, header.rows, name, "row tables", ZSTD_compressBound(20 * rows)), rows,
+      data->info.output_count(), name);
   data->row_output = std::move(tables.row_output);
   data->row_color = std::move(tables.row_color);
   data->coverage = std::move(tables.coverage);
 
-  const auto norms = section_bytes(bytes, header.column_norms, name, "column norms");
+  const auto norms = section_bytes(input, header.column_norms, name, "column norms", 4 * columns);
   if (norms.size() != 4 * columns) damaged(name, "column norms have the wrong size");
   data->column_norms.resize(columns);
   std::memcpy(data->column_norms.data(), norms.data(), norms.size());
@@ -252,18 +295,20 @@ Transport Transport::open(const std::filesystem::path& file) {
     if (!(norm >= 0) || !std::isfinite(norm)) damaged(name, "a column norm is not a number >= 0");
   }
 
-  const auto table = section_bytes(bytes, header.chunk_table, name, "chunk table");
-  if (table.size() != sizeof(FileSection) * header.chunk_count) {
-    damaged(name, "chunk table has the wrong size");
+  // Chunks lie in memory one after the other, each from a cache line on.
+  constexpr std::size_t kLine = 64;
+  std::vector<std::size_t> place(sections.size() + 1, 0);
+  for (std::size_t c = 0; c < sections.size(); ++c) {
+    place[c + 1] = place[c] + (sections[c].size + kLine - 1) / kLine * kLine;
   }
-  data->chunks.resize(header.chunk_count);
-  parallel_for(static_cast<int>(header.chunk_count), [&](int i) {
+  const auto memory = std::make_shared<const ChunkMemory>(place.back(), name);
+  data->storage = memory;
+  data->chunks.resize(sections.size());
+  parallel_for(static_cast<int>(sections.size()), [&](int i) {
     const auto c = static_cast<std::size_t>(i);
-    FileSection section;
-    std::memcpy(&section, table.data() + sizeof section * c, sizeof section);
     const std::string what = fmt::format("chunk {}", c);
-    if (section.offset % 16 != 0) damaged(name, what + " is not aligned");
-    const auto chunk = section_bytes(bytes, section, name, what);
+    const std::span<std::byte> chunk = memory->part(place[c], sections[c].size);
+    read_section(input, sections[c], chunk, name, what);
     const std::string wrong = check_chunk(data->layout, chunk);
     if (!wrong.empty()) damaged(name, what + ": " + wrong);
     data->chunks[c] = chunk;

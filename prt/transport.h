@@ -80,8 +80,9 @@ struct ColumnBlocks {
 /// T itself. Immutable, safe to read from any number of threads; copies share the data.
 class Transport {
  public:
-  /// Maps a file and checks every byte of it: sizes before anything is allocated, checksums, and
-  /// that each column's blocks lie inside their chunk. Throws Error{missing} if there is no such
+  /// Reads a file into memory and checks every byte of it: sizes before anything is allocated,
+  /// checksums, and that each column's blocks lie inside their chunk. What becomes of the file
+  /// afterwards does not matter. Throws Error{missing} if there is no such
   /// file, Error{format} if it is not one of ours, is cut short, damaged or of a newer version
   /// (the message says which), Error{io} if the system refuses.
   static Transport open(const std::filesystem::path& file);

@@ -3,57 +3,29 @@
 #include "prt/transport_tables.h"
 
 #include <fmt/format.h>
-#include <zstd.h>
 
 #include <cmath>
 #include <cstring>
 
 #include "core/error.h"
+#include "prt/packing.h"
 #include "prt/transport.h"
 
 namespace haarlight {
-namespace {
-
-template <typename T>
-std::byte* put(std::byte* to, const std::vector<T>& values) {
-  std::memcpy(to, values.data(), values.size() * sizeof(T));
-  return to + values.size() * sizeof(T);
-}
-
-template <typename T>
-const std::byte* take(const std::byte* from, std::vector<T>& values, std::size_t count) {
-  values.resize(count);
-  std::memcpy(static_cast<void*>(values.data()), from, count * sizeof(T));
-  return from + count * sizeof(T);
-}
-
-}  // namespace
 
 std::vector<std::byte> pack_tables(const RowTables& tables) {
   std::vector<std::byte> plain(tables.row_output.size() * 4 + tables.row_color.size() * 12 +
                                tables.coverage.size() * 4);
   put(put(put(plain.data(), tables.row_output), tables.row_color), tables.coverage);
-  std::vector<std::byte> packed(ZSTD_compressBound(plain.size()));
-  const std::size_t size =
-      ZSTD_compress(packed.data(), packed.size(), plain.data(), plain.size(), 6);
-  if (ZSTD_isError(size)) {
-    throw Error(ErrorKind::io, fmt::format("zstd: {}", ZSTD_getErrorName(size)));
-  }
-  packed.resize(size);
-  return packed;
+  return compress_bytes(plain);
 }
 
 RowTables unpack_tables(std::span<const std::byte> packed, std::size_t rows, std::size_t outputs,
                         const std::string& name) {
   const std::size_t expected = rows * 16 + outputs * 4;
-  std::vector<std::byte> plain(expected);
-  const std::size_t size =
-      ZSTD_decompress(plain.data(), plain.size(), packed.data(), packed.size());
-  if (ZSTD_isError(size) || size != expected) {
-    throw Error(ErrorKind::format,
-                fmt::format("{}: row tables do not unpack to {} bytes ({})", name, expected,
-                            ZSTD_isError(size) ? ZSTD_getErrorName(size) : "another size"));
-  }
+  // Padding packs well, but no more than a chunk or two of a file is padding.
+  const std::vector<std::byte> plain =
+      decompress_bytes(packed, expected, expected, name, "row tables");
   RowTables tables;
   const std::byte* from = take(plain.data(), tables.row_output, rows);
   take(take(from, tables.row_color, rows), tables.coverage, outputs);
