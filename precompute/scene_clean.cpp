@@ -179,13 +179,18 @@ Vec3 smooth_normal(const Faces& faces, std::size_t place, std::size_t triangle) 
   const std::size_t begin = faces.begin[place], end = faces.begin[place + 1];
   if (end - begin > kMostFaces) return own;
   Vec3 sum;
+  double votes = 0;  // that `own` faces as most of them do
   for (std::size_t i = begin; i < end; ++i) {
     const Vec3& other = faces.normal[faces.around[i].triangle];
     const double cosine = dot(own, other);
     if (std::abs(cosine) < kCreaseCosine) continue;
-    sum = sum + other * (cosine < 0 ? -faces.around[i].angle : faces.around[i].angle);
+    const double angle = cosine < 0 ? -faces.around[i].angle : faces.around[i].angle;
+    sum = sum + other * angle;
+    votes += angle;
   }
-  return normalize(sum);  // each term is within 60 degrees of `own`: the sum is not zero
+  // Each term is within 60 degrees of `own`: the sum is not zero. A single face that is wound the
+  // wrong way would make its vertices look into the body, and black.
+  return normalize(votes < 0 ? -sum : sum);
 }
 
 // Writes the triangles anew over vertices that are used, whole and different from each other.

@@ -12,7 +12,8 @@ namespace haarlight {
 ///   longest edge squared) or on the same three places as an earlier one are dropped;
 /// - normals that are zero, not finite or missing (`normal` empty) are made: the mean of the faces
 ///   around the place, weighted by their angle there, leaving out those that meet this face at more
-///   than 60 degrees (a crease). Faces wound the other way count with their normal reversed;
+///   than 60 degrees (a crease). Faces wound the other way count with their normal reversed, and
+///   the side is that of the most of them;
 /// - vertices equal in everything become one, those that no triangle uses disappear.
 /// `uv` may be empty. Throws Error{format} if a triangle names a vertex or material that is not
 /// there, Error{missing} if no triangle is left.

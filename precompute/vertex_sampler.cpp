@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <tuple>
+#include <utility>
 
 #include "precompute/bsdf.h"
 #include "precompute/surface.h"
@@ -71,11 +73,59 @@ VertexSampler::VertexSampler(const Scene& scene, const Visibility& visibility)
       triangles_[next[place_[v]]++] = static_cast<std::uint32_t>(t);
     }
   }
+  join_sheets();
   for (const std::uint32_t m : material_) {
     if (m == kNone) continue;
     const Material& material = scene.material[m];
     view_dependent_ += material.model != SurfaceModel::phong || l1_norm(material.specular) > 0;
   }
+}
+
+// Vertices of one place and normal whose triangles meet along an edge, as at the seam of a texture,
+// are of one sheet. Where more than two triangles meet something stands on the edge, and what lies
+// on either side of it may see different things.
+void VertexSampler::join_sheets() {
+  sheet_.resize(position_.size());
+  for (std::uint32_t v = 0; v < sheet_.size(); ++v) sheet_[v] = v;
+  std::vector<std::uint32_t> users(position_.size(), 0);
+  for (const std::uint32_t p : place_) ++users[p];
+  const auto root = [&](std::uint32_t v) {
+    while (sheet_[v] != v) v = sheet_[v] = sheet_[sheet_[v]];
+    return v;
+  };
+
+  // Edges by the places of their ends, where one of them has several vertices.
+  struct Edge {
+    std::uint32_t low, high;        // places
+    std::uint32_t at_low, at_high;  // vertices
+    auto key() const { return std::tie(low, high, at_low, at_high); }
+  };
+  std::vector<Edge> edges;
+  for (const Triangle& t : scene_.triangle) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      std::uint32_t a = t.vertex[c], b = t.vertex[(c + 1) % 3];
+      if (place_[b] < place_[a]) std::swap(a, b);
+      if (users[place_[a]] + users[place_[b]] == 2) continue;
+      edges.push_back({place_[a], place_[b], a, b});
+    }
+  }
+  std::sort(edges.begin(), edges.end(),
+            [](const Edge& a, const Edge& b) { return a.key() < b.key(); });
+  const auto join = [&](std::uint32_t v, std::uint32_t w) {
+    if (!(scene_.normal[v] == scene_.normal[w])) return;
+    const std::uint32_t a = root(v), b = root(w);
+    sheet_[std::max(a, b)] = std::min(a, b);
+  };
+  for (std::size_t begin = 0, end = 0; begin < edges.size(); begin = end) {
+    while (end < edges.size() && edges[end].low == edges[begin].low &&
+           edges[end].high == edges[begin].high) {
+      ++end;
+    }
+    if (end - begin != 2) continue;
+    join(edges[begin].at_low, edges[begin + 1].at_low);
+    join(edges[begin].at_high, edges[begin + 1].at_high);
+  }
+  for (std::uint32_t v = 0; v < sheet_.size(); ++v) sheet_[v] = root(v);
 }
 
 Vec3 VertexSampler::centre(std::uint32_t triangle) const {
@@ -99,7 +149,8 @@ Vec3 VertexSampler::origin(std::uint32_t vertex) const {
       std::span(triangles_).subspan(first_[place], first_[place + 1] - first_[place]);
   const auto is_own = [&](std::uint32_t t) {
     const auto& v = scene_.triangle[t].vertex;
-    return v[0] == vertex || v[1] == vertex || v[2] == vertex;
+    const std::uint32_t sheet = sheet_[vertex];
+    return sheet_[v[0]] == sheet || sheet_[v[1]] == sheet || sheet_[v[2]] == sheet;
   };
 
   // Its own triangles: their planes, their middle.

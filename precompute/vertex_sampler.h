@@ -16,11 +16,13 @@ namespace haarlight {
 
 /// A vertex lies on the border of its triangles and of all others that meet there, so that the
 /// place to look from needs care. Its side is that of its shading normal. The place is moved
-///   into its own triangles (those that have this very vertex) by a thousandth, where they end at
-///   it: what touches it without being joined to it does not decide by a rounding;
+///   into its own triangles (those that have this very vertex, or one of the same place and normal
+///   across an edge of two triangles) by a thousandth, where they end at it: what touches it
+///   without being joined to it does not decide by a rounding;
 ///   off the planes of its own triangles, and of those that share its place and rise above them
 ///   (the wall at the foot of which a floor ends), by Visibility::kSurfaceOffset at least.
-/// A convex body casts no shadow on itself then, and in a closed room no vertex sees out.
+/// A convex body casts no shadow on itself then, in a closed room no vertex sees out, and vertices
+/// that only texture coordinates keep apart see the same.
 ///
 /// Only what is seen alike from everywhere is kept of a material: its diffuse part, under a coat
 /// with the coat's mean share of light let out. Textures are looked up at the vertex; normal
@@ -48,6 +50,7 @@ class VertexSampler {
   struct Corner {
     std::uint32_t vertex = 0, triangle = 0, corner = 0;
   };
+  void join_sheets();
   Vec3 centre(std::uint32_t triangle) const;
   Vec3 face_normal(std::uint32_t triangle) const;
   Vec3 origin(std::uint32_t vertex) const;
@@ -56,6 +59,7 @@ class VertexSampler {
   const Visibility& visibility_;
   std::vector<Vec3> position_;            // local, of each vertex
   std::vector<std::uint32_t> place_;      // of each vertex: vertices at one place share it
+  std::vector<std::uint32_t> sheet_;      // of each vertex: those of one sheet at a place share it
   std::vector<std::uint32_t> first_;      // of each place in triangles_, and the end
   std::vector<std::uint32_t> triangles_;  // around each place, ascending
   std::vector<std::uint32_t> material_;   // of each vertex: that of its first triangle

@@ -15,7 +15,12 @@ function(haarlight_hard_test group)
     PROPERTIES LABELS hard TIMEOUT 600 FIXTURES_SETUP hard_cases)
 endfunction()
 
+find_package(rapidcheck REQUIRED)
 haarlight_hard_test(numbers SOURCES numbers_lighting numbers_basis numbers_floats USES haarlight_prt)
+haarlight_hard_test(properties SOURCES properties USES haarlight_prt rapidcheck)
+haarlight_hard_test(long SOURCES long_run USES haarlight_prt)
+haarlight_hard_test(geometry SOURCES geometry_lobes geometry_rays USES haarlight_precompute)
+haarlight_hard_test(determinism SOURCES determinism USES haarlight_precompute XxHash::XxHash)
 
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
 add_test(NAME HardCases.PlantedFaultsFitTheTree
