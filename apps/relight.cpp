@@ -17,6 +17,7 @@
 #include "apps/repairs.h"
 #include "apps/verbs.h"
 #include "core/image_io.h"
+#include "core/image_metrics.h"
 #include "prt/completeness.h"
 #include "prt/image_relighter.h"
 #include "prt/metrics_csv.h"
@@ -187,6 +188,7 @@ void RelightCommand::save(const SequenceFrame& frame, Image picture, double expo
   const std::filesystem::path stem = folder / fmt::format("frame_{:04}", frame.metrics.frame);
   for (const std::string& format : formats) {
     const std::filesystem::path file = stem.string() + "." + format;
+    check_finite(picture, file.string());
     save_image(file, format == "png" ? tonemap(picture, {curve, exposure}) : picture);
   }
 }

@@ -28,6 +28,7 @@ Inputs& inputs();
 void register_memory();
 void register_decide();
 void register_relight();
+void register_accumulate();
 void register_rays();
 void register_full_light();
 

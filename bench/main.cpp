@@ -41,6 +41,7 @@ int run(const std::string& transport, const std::string& environment, const std:
     register_memory();
     register_decide();
     register_relight();
+    register_accumulate();
   }
   if (!scene.empty()) {
     in.scene = import_scene(scene);
@@ -75,7 +76,8 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Measures relighting and ray tracing, and prints ratios to the machine's own limits.\n"
       "All --benchmark_* flags of Google Benchmark work; --benchmark_filter=REGEX picks cases:\n"
-      "memory.read, decide.*, apply.*, frame.* (with --transport), rays.* (with --scene), light.*, "
+      "memory.read, decide.*, apply.*, frame.*, sums.* (with --transport), rays.* (with --scene), "
+      "light.*, "
       "run.*"};
   std::string transport, environment, scene;
   CLI::Option* file = app.add_option("--transport", transport,

@@ -114,6 +114,7 @@ void register_relight() {
     add("frame.pbi.k" + std::to_string(k), frame, LightingMethod::pbi, k);
   }
   add("frame.bi.k30", frame, LightingMethod::bi, 30);
+  add("frame.bi.k100", frame, LightingMethod::bi, 100);
 }
 
 }  // namespace haarlight::bench

@@ -55,6 +55,23 @@ void Collector::print_summary() const {
                  entry.counters.at("lighting_error"));
     }
   }
+  for (const char* k : {"k30", "k100"}) {
+    const Case* exact = find(fmt::format("sums.double.{}", k));
+    const Case* rough = find(fmt::format("sums.float.{}", k));
+    const Case* whole = find(fmt::format("frame.bi.{}", k));
+    if (!exact || !rough) continue;
+    const double of_double = exact->counters.at("ms_per_frame");
+    const double of_float = rough->counters.at("ms_per_frame");
+    fmt::print("  sums in double / in float, {}: {:.3f} / {:.3f} ms, drift {:.1e} / {:.1e}", k,
+               of_double, of_float, exact->counters.at("drift"), rough->counters.at("drift"));
+    if (whole) {
+      const double frame = whole->counters.at("ms_per_frame");
+      const double cost = (of_double - of_float) / frame;
+      fmt::print("; {:.1f} % of a frame of {:.3f} ms (wanted 10 % or less: {})", 100 * cost, frame,
+                 cost <= 0.1 ? "met" : "MISSED");
+    }
+    fmt::print("\n");
+  }
   for (const char* name : {"decide.nwa.k30", "decide.bi.k30", "decide.pbi.k30"}) {
     if (const Case* decide = find(name)) {
       fmt::print("  {:<18} {:.3f} ms\n", name, decide->counters.at("ms_per_frame"));

@@ -11,9 +11,8 @@
 #include "core/error.h"
 
 namespace haarlight {
-namespace {
 
-void check_finite(const Image& image, const char* which) {
+void check_finite(const Image& image, const std::string& which) {
   for (int y = 0; y < image.height; ++y) {
     for (int x = 0; x < image.width; ++x) {
       if (!is_finite(image.at(x, y))) {
@@ -24,8 +23,6 @@ void check_finite(const Image& image, const char* which) {
     }
   }
 }
-
-}  // namespace
 
 ImageDifference compare_images(const Image& image, const Image& reference) {
   if (image.width != reference.width || image.height != reference.height) {

@@ -2,6 +2,8 @@
 
 #pragma once
 
+#include <string>
+
 #include "core/image.h"
 
 namespace haarlight {
@@ -18,5 +20,9 @@ struct ImageDifference {
 /// `reference` is the second. Throws Error{invalid_argument} if sizes differ or are zero, and if a
 /// value is not finite (naming the picture and pixel). Sums are in double.
 ImageDifference compare_images(const Image& image, const Image& reference);
+
+/// Throws Error{invalid_argument} naming `which` and the pixel if a value is not finite; programs
+/// ask before they write a picture that they have made.
+void check_finite(const Image& image, const std::string& which);
 
 }  // namespace haarlight

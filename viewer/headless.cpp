@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/image_io.h"
+#include "core/image_metrics.h"
 #include "prt/metrics_csv.h"
 #include "prt/tonemap.h"
 #include "viewer/session.h"
@@ -62,6 +63,7 @@ std::string run_headless(const RunOptions& options) {
   if (!options.screenshot.empty()) {
     const double exposure = options.exposure_ev.value_or(frame.exact_exposure_ev);
     const Image picture = session.picture_with_background();
+    check_finite(picture, options.screenshot.string());
     save_image(options.screenshot,
                options.false_colour
                    ? false_colour(picture, exposure)

@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/image_io.h"
+#include "core/image_metrics.h"
 #include "core/parallel.h"
 #include "prt/image_relighter.h"
 #include "prt/motion_background.h"
@@ -134,7 +135,9 @@ void Session::act(const ViewAction& action) {
                                             ": no picture to save, expected a transport and an "
                                             "environment to be open");
       }
-      save_image(save.file, s.picture_with_background());
+      const Image picture = s.picture_with_background();
+      check_finite(picture, save.file.string());
+      save_image(save.file, picture);
     }
   };
   std::visit(Actor{*this}, action);

@@ -263,6 +263,8 @@ TEST(HardCases, Row32_Scale) {
 
 TEST(HardCases, Row33_Leaks) {
   property("from inside a closed room at most 2e-5 of rays get out, wherever the room stands");
+  // Every other ray is aimed at an edge, where two triangles might leave each other a gap; not at
+  // its ends, which are row 34's.
   Scene ball = shapes::empty_scene();
   shapes::add_sphere(ball, {}, 1, 5);
   double rays = 0, leaked = 0;
@@ -270,11 +272,22 @@ TEST(HardCases, Row33_Leaks) {
     const Scene there = shapes::moved(ball, 1, by);
     const Visibility visibility(there);
     std::mt19937_64 random(3);
-    std::uniform_real_distribution<double> place(-0.5, 0.5);
+    std::uniform_real_distribution<double> place(-0.5, 0.5), along(0.05, 0.95);
     for (int i = 0; i < 170000; ++i) {
       Packet packet;
-      for (int lane = 0; lane < 8; ++lane) packet.set(lane, direction_of(random));
-      const auto origin = to_float({place(random), place(random), place(random)});
+      const Vec3 from{place(random), place(random), place(random)};
+      const auto origin = to_float(from);
+      for (int lane = 0; lane < 8; ++lane) {
+        Vec3 d = direction_of(random);
+        if (lane % 2) {
+          const auto t = static_cast<std::uint32_t>(random() % visibility.triangle_count());
+          const int c = static_cast<int>(random() % 3);
+          const double share = along(random);
+          d = normalize(visibility.corner(t, c) * share +
+                        visibility.corner(t, (c + 1) % 3) * (1 - share) - from);
+        }
+        packet.set(lane, d);
+      }
       leaked += 8 - std::popcount(visibility.occluded8(origin, packet.x, packet.y, packet.z, 0xff));
       rays += 8;
     }

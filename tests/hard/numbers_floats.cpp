@@ -57,18 +57,23 @@ class TurningSky {
 
 TEST(HardCases, Row09_Denormals) {
   property("a frame of denormal light, or of traces beside light, takes at most 1.2 times as long");
-  fixtures::SmallTransport small = fixtures::small_transport(16, 128, 128, 31, 0.5);
+  fixtures::SmallTransport small = fixtures::small_transport(16, 128, 128, 31, 0.5, false);
   const Transport transport = build_transport(small.info, small.tiles, small.thresholds);
+  for (TileRows& tile : small.tiles) tile.color.assign(tile.color.size(), Rgb{1e-9f, 1e-9f, 1e-9f});
+  const Transport black = build_transport(small.info, small.tiles, small.thresholds);
   TurningSky normal(transport, 1, 0.5f);
   struct Case {
     const char* name;
     double scale;
     float dark;
+    const Transport& transport;
   };
   // Whole skies below 1.2e-38; some whose products with transport are; traces beside real light.
-  for (const Case& c : {Case{"denormal sky", 1e-43, 1e-44f}, Case{"1e-33 sky", 1e-36, 1e-36f},
-                        Case{"denormals beside light", 1, 3e-39f}}) {
-    TurningSky sky(transport, c.scale, c.dark);
+  for (const Case& c :
+       {Case{"denormal sky", 1e-43, 1e-44f, transport}, Case{"1e-33 sky", 1e-36, 1e-36f, transport},
+        Case{"denormals beside light", 1, 3e-39f, transport},
+        Case{"1e-28 sky on black velvet", 1e-31, 0.0f, black}}) {
+    TurningSky sky(c.transport, c.scale, c.dark);
     double ratio = HUGE_VAL;
     for (int round = 0; round < 12 && ratio > 1.1; ++round) {
       double plain = HUGE_VAL, traces = HUGE_VAL;

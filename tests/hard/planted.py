@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Can the hard cases' tests fail? Plants one fault after the other and watches the row turn red.
 
-    planted.py [--tree build/planted] [--only REGEX] [--jobs 2] [--prefix CMD] [--apply-only]
+    planted.py [--tree build/planted] [--only REGEX] [--jobs 2] [--prefix CMD] [--cmake ARG] [--apply-only]
 
 planted/NN_name.patch is a fault that row NN must catch; its first lines say what it is:
     Fault: sums in float
@@ -50,7 +50,8 @@ def copy_tree(tree):
     listed = run(["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, check=True).stdout.split("\n")
     wanted = {name for name in listed if name and (ROOT / name).is_file()}
     for old in tree.rglob("*"):
-        if old.is_file() and old.relative_to(tree).as_posix() not in wanted:
+        name = old.relative_to(tree).as_posix()
+        if old.is_file() and name not in wanted and not name.startswith("build/"):
             old.unlink()
     for name in wanted:
         source, target = ROOT / name, tree / name
@@ -67,10 +68,12 @@ def apply(fault, tree, *options):
 
 
 class Build:
-    def __init__(self, tree, folder, jobs, prefix):
+    def __init__(self, tree, jobs, prefix, arguments):
+        folder = tree / "build"
         self.folder, self.jobs, self.prefix = folder, jobs, prefix
         self.command(["cmake", "-S", str(tree), "-B", str(folder), "-G", "Ninja",
-                      "-DHAARLIGHT_BUILD_TESTS=ON", "-DHAARLIGHT_BUILD_BENCH=OFF"], must=True)
+                      "-DHAARLIGHT_BUILD_TESTS=ON", "-DHAARLIGHT_BUILD_BENCH=OFF", *arguments],
+                     must=True)
         targets = self.command(["cmake", "--build", str(folder), "--target", "help"], must=True).stdout
         self.binaries = sorted(set(re.findall(r"^(test_hard_\w+):", targets, re.MULTILINE)))
 
@@ -130,6 +133,7 @@ def main():
     parser.add_argument("--only", default="", help="regular expression of the faults' names")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--prefix", default="", help="put before every build and run: 'nice -n 5'")
+    parser.add_argument("--cmake", default="", help="further arguments of cmake")
     parser.add_argument("--apply-only", action="store_true")
     options = parser.parse_args()
     faults = [Fault(path) for path in sorted(PATCHES.glob("*.patch"))]
@@ -143,10 +147,10 @@ def main():
         print(f"{len(faults) - len(stale)} of {len(faults)} faults fit")
         return 1 if stale else 0
 
-    tree, folder = options.tree.resolve() / "tree", options.tree.resolve() / "build"
+    tree = options.tree.resolve()
     tree.mkdir(parents=True, exist_ok=True)
     copy_tree(tree)
-    build = Build(tree, folder, options.jobs, shlex.split(options.prefix))
+    build = Build(tree, options.jobs, shlex.split(options.prefix), shlex.split(options.cmake))
     build.make(*build.binaries, must=True)
     placed = []
     for fault in faults:

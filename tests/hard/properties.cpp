@@ -184,6 +184,40 @@ TEST(HardCases, Row04_ResetAndLargeDelta) {
   at_most("sums that are not +0 in the dark", dark, 0);
 }
 
+// The same with bands long enough to be folded into kept pictures.
+TEST(HardCases, Row04_FoldedBands) {
+  property("bands folded into kept pictures and reset again meet bound A");
+  const fixtures::SmallTransport small = fixtures::small_transport(8, 64, 64, 11);
+  const HaarLayout layout(8);
+  RowSums sums(build_transport(small.info, small.tiles, small.thresholds));
+  const auto plain_bytes = static_cast<double>(sums.extra_bytes());
+  Judge judge(small);
+  std::vector<RgbD> light(static_cast<std::size_t>(layout.size()));
+  std::mt19937 random(12);
+  double worst = 0, folded = 0;
+  const int count = full() ? 4000 : 240;
+  for (int step = 0; step < count; ++step) {
+    LightingUpdate update;
+    for (std::size_t b = 0; b < static_cast<std::size_t>(layout.band_count()); ++b) {
+      update.reset[b] = random() % 6 == 0;
+    }
+    for (int i = 0; i < layout.size(); ++i) {
+      const auto j = static_cast<std::size_t>(i);
+      if (update.reset[static_cast<std::size_t>(layout.band_of(i))]) light[j] = {};
+      if (random() % 3 != 0) continue;
+      update.deltas.push_back({i, RgbD(color_of(random))});
+      light[j] += update.deltas.back().delta;
+    }
+    judge.count(sums.apply(update));
+    const double pictures = (static_cast<double>(sums.extra_bytes()) - plain_bytes) /
+                            (static_cast<double>(sums.totals().size()) * sizeof(double));
+    folded = std::max(folded, std::floor(pictures));
+    if (step % 8 == 0) worst = std::max(worst, judge.of_bound(outputs(sums), light, false));
+  }
+  at_least("kept pictures", folded, 1);
+  at_most("of bound A", worst, 1);
+}
+
 LightingOptions random_options(const HaarLayout& layout, std::mt19937& random) {
   LightingOptions options;
   options.method = kMethods[random() % 4];
