@@ -147,7 +147,7 @@ class AlbedoTable {
   }
 
  private:
-  static constexpr std::size_t kCosines = 64, kAlphas = 56;
+  static constexpr std::size_t kCosines = kAlbedoNodes, kAlphas = 56;
   static double alpha_of(std::size_t a) {
     const double root = static_cast<double>(a) / (kAlphas - 1);
     return root * root;
@@ -219,6 +219,15 @@ Bsdf::LobeValues ggx_albedo(double cosine, double alpha) {
 Bsdf::LobeValues ggx_mean_albedo(double alpha) {
   const auto mean = albedo_table().mean(alpha);
   return {mean.first, mean.second};
+}
+
+void ggx_albedo_nodes(double alpha, std::span<float, 2 * kAlbedoNodes> nodes) {
+  for (std::size_t i = 0; i < kAlbedoNodes; ++i) {
+    const double root = static_cast<double>(i) / (kAlbedoNodes - 1);
+    const Bsdf::LobeValues e = ggx_albedo(root * root, alpha);
+    nodes[2 * i] = static_cast<float>(e.first);
+    nodes[2 * i + 1] = static_cast<float>(e.second);
+  }
 }
 
 double coat_albedo(double cosine, double alpha, double f0) {

@@ -2,7 +2,9 @@
 
 #pragma once
 
+#include <cstddef>
 #include <optional>
+#include <span>
 
 #include "core/frame.h"
 #include "core/vec.h"
@@ -27,5 +29,10 @@ std::optional<Vec3> ggx_sample(const Vec3& n, const Vec3& o, double alpha, doubl
 /// alpha = 0: Schlick's Fresnel itself.
 double coat_albedo(double cosine, double alpha, double f0);
 double coat_mean_albedo(double alpha, double f0);
+
+/// The table behind ggx_albedo() for one alpha: first and second in turn at cosines (i / 63)^2.
+/// Linear interpolation over the square root of the cosine is ggx_albedo() itself, alpha > 0.
+inline constexpr std::size_t kAlbedoNodes = 64;
+void ggx_albedo_nodes(double alpha, std::span<float, 2 * kAlbedoNodes> nodes);
 
 }  // namespace haarlight

@@ -21,30 +21,20 @@
 
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <span>
-#include <vector>
 
+#include "precompute/direction_table.h"
 #include "precompute/effects.h"
+#include "precompute/indirect_sky.h"
 #include "precompute/point_tracer.h"
 #include "precompute/receiver.h"
 #include "precompute/scene.h"
-#include "precompute/sparse_directions.h"
+#include "precompute/tile_noise.h"
 #include "precompute/visibility.h"
-#include "wavelet/haar.h"
 
 namespace haarlight {
-
-/// How noisy a tile's picture is under the built-in lightings; add up over tiles.
-struct TileNoise {
-  std::vector<double> variance;  ///< per lighting: of the picture, summed over rows and channels
-  std::vector<double> energy;    ///< per lighting: the picture squared, summed likewise
-  std::int64_t paths = 0;        ///< traced
-  void add(const TileNoise& other);
-  /// The largest relative noise, root of variance by energy, over the lightings; 0 without any.
-  double worst() const;
-};
 
 /// How long to go on.
 struct PathBudget {
@@ -65,28 +55,29 @@ class Interreflection {
   struct Scratch;
   static std::unique_ptr<Scratch, void (*)(Scratch*)> make_scratch();
 
-  /// Adds to `rows`, [channel][row][texel] with kTileRows rows of all texels, what reaches the
-  /// receivers after 1 to effects.bounces bounces. `rows` holds what reaches them directly, against
-  /// which noise is measured. All numbers depend on the receivers and the seed alone.
-  void add(const TileReceivers& tile, const PathBudget& budget, Scratch& scratch,
-           std::span<float> rows, TileNoise& noise, RayCounts& counts) const;
+  /// One tile after the other, each in this order:
+  ///   begin
+  ///   add_direct   for every row and channel: all texels of what reaches it directly, against
+  ///                which noise is measured; rows left out show nothing
+  ///   trace        what reaches the receivers after 1 to effects.bounces bounces
+  ///   add_to       for every row and channel: adds that to all of its texels
+  /// All numbers depend on the receivers, their rows and the seed alone.
+  void begin(Scratch& scratch) const;
+  void add_direct(std::size_t row, std::size_t channel, const float* texels,
+                  Scratch& scratch) const;
+  void trace(const TileReceivers& tile, const PathBudget& budget, Scratch& scratch,
+             TileNoise& noise, RayCounts& counts) const;
+  void add_to(std::size_t row, std::size_t channel, float* texels, const Scratch& scratch) const;
 
  private:
-  class Batch;
-
-  std::size_t phases() const { return static_cast<std::size_t>(directions_.phases()); }
+  class Paths;
 
   const Scene& scene_;
   const Visibility& visibility_;
   Effects effects_;
   std::uint64_t seed_;
-  HaarLayout layout_;
-  SparseDirections directions_;
-  double narrow_;                      // lobes below this half width are sampled, radians
-  std::vector<std::uint32_t> sum_at_;  // per texel: where its square's sum is for row 0
-  std::size_t lights_ = 0;
-  std::vector<float> light_;         // [phase][light][slot]
-  std::vector<float> light_texels_;  // [light][texel]
+  IndirectSky sky_;
+  double narrow_;  // lobes below this half width are sampled, radians
 };
 
 }  // namespace haarlight

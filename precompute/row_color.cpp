@@ -5,11 +5,43 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/simd.h"
+
 namespace haarlight {
 namespace {
 
+typedef float Eight __attribute__((vector_size(32), aligned(4)));
+
 double dot_rgb(const RgbD& a, const RgbD& b) { return a.r * b.r + a.g * b.g + a.b * b.b; }
 double largest(const RgbD& c) { return std::max({std::abs(c.r), std::abs(c.g), std::abs(c.b)}); }
+
+// Sums of r r, g g, b b, r g, r b and g b: eight lanes a block, in single precision, and blocks in
+// double. A block of 512 is right to 2^-24 times 64 at worst, far below the per cent that matters.
+HAARLIGHT_MULTIVERSION
+void sum_products(const float* r, const float* g, const float* b, std::size_t size, double* sum) {
+  constexpr std::size_t kBlock = 512;
+  std::fill_n(sum, 6, 0.0);
+  for (std::size_t begin = 0; begin < size; begin += kBlock) {
+    const std::size_t end = std::min(size, begin + kBlock);
+    Eight lane[6] = {};
+    std::size_t k = begin;
+    for (; k + 8 <= end; k += 8) {
+      const Eight x = *reinterpret_cast<const Eight*>(r + k);
+      const Eight y = *reinterpret_cast<const Eight*>(g + k);
+      const Eight z = *reinterpret_cast<const Eight*>(b + k);
+      lane[0] += x * x, lane[1] += y * y, lane[2] += z * z;
+      lane[3] += x * y, lane[4] += x * z, lane[5] += y * z;
+    }
+    for (; k < end; ++k) {
+      const Eight rest{r[k] * r[k]}, other{g[k] * g[k]}, third{b[k] * b[k]};
+      lane[0] += rest, lane[1] += other, lane[2] += third;
+      lane[3] += Eight{r[k] * g[k]}, lane[4] += Eight{r[k] * b[k]}, lane[5] += Eight{g[k] * b[k]};
+    }
+    for (std::size_t i = 0; i < 6; ++i) {
+      for (std::size_t l = 0; l < 8; ++l) sum[i] += static_cast<double>(lane[i][l]);
+    }
+  }
+}
 
 }  // namespace
 
@@ -23,13 +55,9 @@ bool is_multiple(const RgbD& color, const RgbD& base) {
 }
 
 ColorFit fit_color(const float* r, const float* g, const float* b, std::size_t size) {
-  double rr = 0, gg = 0, bb = 0, rg = 0, rb = 0, gb = 0;
-  for (std::size_t k = 0; k < size; ++k) {
-    const auto x = static_cast<double>(r[k]), y = static_cast<double>(g[k]),
-               z = static_cast<double>(b[k]);
-    rr += x * x, gg += y * y, bb += z * z;
-    rg += x * y, rb += x * z, gb += y * z;
-  }
+  double sum[6];
+  sum_products(r, g, b, size, sum);
+  const double rr = sum[0], gg = sum[1], bb = sum[2], rg = sum[3], rb = sum[4], gb = sum[5];
   const double trace = rr + gg + bb;
   if (!(trace > 0)) return {};
   // Power iteration from the channels' norms: all entries of the matrix are nearly always positive,
@@ -50,6 +78,7 @@ ColorFit fit_color(const float* r, const float* g, const float* b, std::size_t s
   return fit;
 }
 
+HAARLIGHT_MULTIVERSION
 void to_grey(const RgbD& color, float* r, const float* g, const float* b, std::size_t size) {
   const double square = dot_rgb(color, color);
   if (!(square > 0)) return;

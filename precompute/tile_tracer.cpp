@@ -12,6 +12,7 @@
 
 #include "core/error.h"
 #include "precompute/row_color.h"
+#include "precompute/row_products.h"
 
 namespace haarlight {
 namespace {
@@ -108,13 +109,13 @@ void TileTracer::trace(std::span<const std::uint32_t> outputs, Scratch& scratch,
 }
 
 // What reaches a receiver directly, in each of `channels`: three, or one grey in units of `base`.
-void TileTracer::add_direct(const Receiver& receiver, Scratch& scratch,
+// It replaces what is there if the receiver is the row's first.
+void TileTracer::add_direct(const Receiver& receiver, bool first, Scratch& scratch,
                             std::span<float* const> channels, const RgbD& base,
                             RayCounts& counts) const {
   const auto size = static_cast<std::size_t>(layout_.size());
   const ShadingPoint point = shading_point(receiver);
   const std::array<RgbD, 3> color = part_colors(receiver);
-  const bool second = l1_norm(color[2]) > 0;
   scratch.deposits.clear();
   points_.trace(point, {scratch.diffuse, scratch.first, scratch.second, &scratch.deposits},
                 scratch.point, counts);
@@ -126,19 +127,17 @@ void TileTracer::add_direct(const Receiver& receiver, Scratch& scratch,
       return static_cast<float>(channels.size() == 1 ? multiple_of(value, base)
                                                      : channel(value, c));
     };
-    float* sum = channels[c];
-    if (const float f = factor(color[0]); f != 0) {
-      for (std::size_t k = 0; k < size; ++k) sum[k] += f * scratch.diffuse[k];
-    }
+    std::array<RowPart, 3> parts;
+    std::size_t count = 0;
+    parts[count++] = {scratch.diffuse.data(), factor(color[0])};
     if (point.glossy) {
-      const float f = factor(color[1]);
-      for (std::size_t k = 0; k < size; ++k) sum[k] += f * scratch.first[k];
-      if (second) {
-        const float g = factor(color[2]);
-        for (std::size_t k = 0; k < size; ++k) sum[k] += g * scratch.second[k];
-      }
+      parts[count++] = {scratch.first.data(), factor(color[1])};
+      if (l1_norm(color[2]) > 0) parts[count++] = {scratch.second.data(), factor(color[2])};
     }
-    for (const Deposit& d : scratch.deposits) sum[d.texel] += factor(receiver.weight * d.value);
+    add_row_parts(std::span(parts).first(count), size, !first, channels[c]);
+    for (const Deposit& d : scratch.deposits) {
+      channels[c][d.texel] += factor(receiver.weight * d.value);
+    }
   }
 }
 
@@ -185,30 +184,39 @@ void TileTracer::trace(const TileReceivers& receivers, Scratch& scratch, TileRow
 
   // Direct light, [channel][row][texel].
   const std::size_t channels = open_blocks == 0 ? 1 : 3;
-  scratch.texels.assign(channels * kRows * size, 0.0f);
+  scratch.texels.resize(std::max(scratch.texels.size(), channels * kRows * size));
   const auto row_of = [&](std::size_t c, std::size_t row) {
     return scratch.texels.data() + (c * kRows + row) * size;
   };
+  if (paths_) paths_->begin(*scratch.paths);
   for (std::size_t row = 0; row < kRows; ++row) {
     const bool open = (open_blocks >> (row / kBlockRows) & 1u) != 0;
+    const std::size_t own_channels = open ? 3 : 1;
     std::array<float*, 3> to{};
-    for (std::size_t c = 0; c < (open ? 3u : 1u); ++c) to[c] = row_of(c, row);
+    for (std::size_t c = 0; c < own_channels; ++c) to[c] = row_of(c, row);
+    const std::span<float* const> into(to.data(), own_channels);
+    bool first = true;
     for (const std::size_t i : scratch.of_row[row]) {
-      add_direct(receivers.receivers[i], scratch, {to.data(), open ? 3u : 1u}, base[row], counts);
+      add_direct(receivers.receivers[i], first, scratch, into, base[row], counts);
+      first = false;
     }
-    if (!open && !scratch.of_row[row].empty()) tile.color[row] = Rgb(base[row]);
-  }
-  for (const Escape& e : receivers.escapes) {
-    const std::size_t texel = texel_of(e.direction, layout_.face_size());
-    for (std::size_t c = 0; c < 3; ++c) {
-      row_of(c, e.row)[texel] += static_cast<float>(channel(e.weight, c));
+    if (first) {
+      for (float* channel_row : into) std::fill_n(channel_row, size, 0.0f);
     }
+    if (!open && !first) tile.color[row] = Rgb(base[row]);
+    for (const Escape& e : receivers.escapes) {
+      if (e.row != row) continue;
+      const std::size_t texel = texel_of(e.direction, layout_.face_size());
+      for (std::size_t c = 0; c < 3; ++c) to[c][texel] += static_cast<float>(channel(e.weight, c));
+    }
+    if (!paths_ || receivers.coverage[row] <= 0) continue;
+    for (std::size_t c = 0; c < 3; ++c) paths_->add_direct(row, c, to[c], *scratch.paths);
   }
 
   if (paths_) {
     TileNoise own;
-    paths_->add(receivers, {options_.noise, options_.paths}, *scratch.paths, scratch.texels,
-                noise ? *noise : own, counts);
+    paths_->trace(receivers, {options_.noise, options_.paths}, *scratch.paths, noise ? *noise : own,
+                  counts);
   }
 
   // Which of the open blocks are of one colour a row after all.
@@ -218,6 +226,9 @@ void TileTracer::trace(const TileReceivers& receivers, Scratch& scratch, TileRow
     if (!(open_blocks >> block & 1u)) continue;
     bool grey = true;
     for (std::size_t row = block * kBlockRows; row < (block + 1) * kBlockRows; ++row) {
+      if (paths_ && !scratch.of_row[row].empty()) {
+        for (std::size_t c = 0; c < 3; ++c) paths_->add_to(row, c, row_of(c, row), *scratch.paths);
+      }
       const ColorFit found = fit_color(row_of(0, row), row_of(1, row), row_of(2, row), size);
       fit[row] = found.color;
       if (found.residual > 0.01) grey = false;
@@ -234,13 +245,16 @@ void TileTracer::trace(const TileReceivers& receivers, Scratch& scratch, TileRow
 
   const auto start = std::chrono::steady_clock::now();
   const std::size_t stored = tile.rgb_blocks == 0 ? 1 : 3;
-  tile.values.assign(stored * kRows * size, 0.0f);
-  for (std::size_t row = 0; row < kRows; ++row) {
-    if (receivers.coverage[row] <= 0) continue;
-    const bool rgb = (tile.rgb_blocks >> (row / kBlockRows) & 1u) != 0;
-    for (std::size_t c = 0; c < (rgb ? 3u : 1u); ++c) {
-      haar_forward(layout_, std::span<const float>(row_of(c, row), size),
-                   std::span<float>(tile.values).subspan((c * kRows + row) * size, size));
+  tile.values.resize(stored * kRows * size);
+  for (std::size_t c = 0; c < stored; ++c) {
+    for (std::size_t row = 0; row < kRows; ++row) {
+      const std::span<float> to(tile.values.data() + (c * kRows + row) * size, size);
+      const bool used = c == 0 || (tile.rgb_blocks >> (row / kBlockRows) & 1u) != 0;
+      if (used && receivers.coverage[row] > 0) {
+        haar_forward(layout_, std::span<const float>(row_of(c, row), size), to);
+      } else {
+        std::fill(to.begin(), to.end(), 0.0f);
+      }
     }
   }
   scratch.transform_seconds +=

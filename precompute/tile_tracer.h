@@ -83,8 +83,8 @@ class TileTracer {
   const TraceOptions& options() const { return options_; }
 
  private:
-  void add_direct(const Receiver& receiver, Scratch& scratch, std::span<float* const> channels,
-                  const RgbD& base, RayCounts& counts) const;
+  void add_direct(const Receiver& receiver, bool first, Scratch& scratch,
+                  std::span<float* const> channels, const RgbD& base, RayCounts& counts) const;
 
   const Scene& scene_;
   const Visibility& visibility_;

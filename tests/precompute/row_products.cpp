@@ -5,7 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <random>
+#include <span>
 
 #include "precompute/row_color.h"
 
@@ -20,40 +23,106 @@ std::vector<float> random_values(std::size_t count, unsigned seed) {
   return values;
 }
 
-TEST(RowProducts, EqualsThePlainSum) {
-  constexpr std::size_t kRows = 12, kLength = 40;
+// Some packets of columns are off: what they hold must not count, whatever it is.
+TEST(RowProducts, EqualsThePlainSumOverPacketsThatAreOn) {
+  constexpr std::size_t kRows = 12, kLength = 40, kStride = 56;
+  std::mt19937 engine(11);
   for (const std::size_t count : {0u, 1u, 7u, 130u}) {
     const auto weight = random_values(count * kRows, 1);
-    const auto values = random_values(count * kLength, 2);
-    std::vector<const float*> columns;
-    for (std::size_t k = 0; k < count; ++k) columns.push_back(values.data() + k * kLength);
-    auto sum = random_values(kRows * kLength, 3);
+    auto values = random_values(count * kLength, 2);
+    std::vector<SparseColumn> columns;
+    for (std::size_t k = 0; k < count; ++k) {
+      columns.push_back({values.data() + k * kLength, engine() & 0x1fu});
+    }
+    const auto on = [&](std::size_t k, std::size_t j) {
+      return columns[k].packets >> (j / 8) & 1u;
+    };
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (!on(i / kLength, i % kLength)) values[i] = std::numeric_limits<float>::quiet_NaN();
+    }
+    auto sum = random_values(kRows * kStride, 3);
     const auto before = sum;
-    add_row_products(weight.data(), columns, kRows, kLength, sum.data());
+    add_row_products(weight.data(), columns, kRows, kLength, sum.data(), kStride);
     for (std::size_t m = 0; m < kRows; ++m) {
-      for (std::size_t j = 0; j < kLength; ++j) {
-        double expected = static_cast<double>(before[m * kLength + j]);
-        for (std::size_t k = 0; k < count; ++k) {
+      for (std::size_t j = 0; j < kStride; ++j) {
+        double expected = static_cast<double>(before[m * kStride + j]);
+        for (std::size_t k = 0; j < kLength && k < count; ++k) {
+          if (!on(k, j)) continue;
           expected += static_cast<double>(weight[k * kRows + m]) *
                       static_cast<double>(values[k * kLength + j]);
         }
         // count + 1 terms of at most 1, each sum and product rounded: (count + 1)^2 2^-24 at worst.
         const double n = static_cast<double>(count) + 1;
-        ASSERT_NEAR(static_cast<double>(sum[m * kLength + j]), expected, n * n * 0x1p-24);
+        ASSERT_NEAR(static_cast<double>(sum[m * kStride + j]), expected, n * n * 0x1p-24);
       }
     }
   }
 }
 
-TEST(RowProducts, DotProductEqualsThePlainSum) {
-  const auto a = random_values(384, 5), b = random_values(384, 6);
-  double expected = 0;
-  for (std::size_t j = 0; j < a.size(); ++j) {
-    expected += static_cast<double>(a[j]) * static_cast<double>(b[j]);
+TEST(RowProducts, PartsOfARow) {
+  const auto a = random_values(40, 5), b = random_values(40, 6), c = random_values(40, 7);
+  const RowPart part[3] = {{a.data(), 0.5f}, {b.data(), -2}, {c.data(), 3}};
+  for (std::size_t parts = 1; parts <= 3; ++parts) {
+    for (const bool keep : {false, true}) {
+      auto sum = random_values(40, 8);
+      const auto before = sum;
+      add_row_parts(std::span(part).first(parts), 40, keep, sum.data());
+      for (std::size_t j = 0; j < 40; ++j) {
+        float expected = keep ? before[j] : 0;
+        const float term[3] = {0.5f * a[j], -2 * b[j], 3 * c[j]};
+        for (std::size_t i = 0; i < parts; ++i) expected += term[i];
+        ASSERT_NEAR(sum[j], expected, 4 * 6.5 * 0x1p-24);  // terms and sums of at most 6.5
+      }
+    }
   }
-  // Eight sums of 48 terms of at most 1 each, then eight more.
-  EXPECT_NEAR(static_cast<double>(dot_product(a.data(), b.data(), 384)), expected,
-              384 * 57 * 0x1p-24);
+}
+
+// Both forms, and adding to what is there; eight sums of at most 48 terms of at most 1 each, then
+// eight more, and one.
+TEST(RowProducts, DotProductsEqualThePlainSum) {
+  constexpr std::size_t kLights = 8, kPackets = 48;
+  const auto value = random_values(8 * kPackets, 5),
+             light = random_values(8 * kPackets * kLights, 6);
+  const std::uint64_t some = 0x0000a5f0c3961234u;
+  const std::uint64_t every = (std::uint64_t{1} << kPackets) - 1;
+  for (const std::uint64_t packets : {some, every}) {
+    std::vector<float> out(kLights, 0.25f);
+    if (packets == every) {
+      add_dot_products(value.data(), kPackets, light.data(), kLights, out.data());
+    } else {
+      add_dot_products({value.data(), packets}, light.data(), kLights, out.data());
+    }
+    for (std::size_t l = 0; l < kLights; ++l) {
+      double expected = 0.25;
+      for (std::size_t j = 0; j < 8 * kPackets; ++j) {
+        if (!(packets >> (j / 8) & 1u)) continue;
+        expected += static_cast<double>(value[j]) *
+                    static_cast<double>(light[(j / 8 * kLights + l) * 8 + j % 8]);
+      }
+      EXPECT_NEAR(static_cast<double>(out[l]), expected, 384 * 58 * 0x1p-24);
+    }
+  }
+}
+
+TEST(RowProducts, LightOfPathsInRows) {
+  constexpr std::size_t kRows = 16, kLights = 8, kPaths = 30, kStride = 20;
+  const auto weight = random_values(kPaths * kRows, 1), light = random_values(kPaths * kLights, 2);
+  std::vector<PathLight> paths;
+  for (std::size_t k = 0; k < kPaths; ++k) {
+    paths.push_back({weight.data() + k * kRows, light.data() + k * kLights});
+  }
+  std::vector<float> sum(kLights * kStride, 1.0f);
+  add_light_products(paths, kRows, kLights, sum.data(), kStride);
+  for (std::size_t l = 0; l < kLights; ++l) {
+    for (std::size_t m = 0; m < kStride; ++m) {
+      double expected = 1;
+      for (std::size_t k = 0; m < kRows && k < kPaths; ++k) {
+        expected += static_cast<double>(weight[k * kRows + m]) *
+                    static_cast<double>(light[k * kLights + l]);
+      }
+      EXPECT_NEAR(static_cast<double>(sum[l * kStride + m]), expected, 31 * 31 * 0x1p-24);
+    }
+  }
 }
 
 TEST(RowColor, FindsTheColorOfARowThatHasOne) {
