@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <utility>
 
 #include "core/parallel.h"
 
@@ -34,12 +35,12 @@ std::vector<int> choose_pilots(TileSource::Worker& worker, std::span<const std::
 }
 
 RayCounts trace_pilots(const TileSource& source, std::span<const std::uint32_t> order,
-                       std::span<const int> pilots, int threads,
-                       const std::function<void(const TileRows&)>& take,
+                       std::span<const int> pilots, int threads, ToleranceTuner& tuner,
                        const std::function<void(int count)>& done) {
   struct Work {
     std::unique_ptr<TileSource::Worker> worker;
     TileRows rows;
+    ToleranceTuner::Pilot pilot;
   };
   std::vector<Work> work(std::min(pilots.size(), static_cast<std::size_t>(std::max(1, threads))));
   for (Work& w : work) w.worker = source.make_worker();
@@ -49,8 +50,9 @@ RayCounts trace_pilots(const TileSource& source, std::span<const std::uint32_t> 
       const auto at = static_cast<std::size_t>(i);
       const auto tile = static_cast<std::size_t>(pilots[begin + at]);
       work[at].worker->trace(order.subspan(tile * kTileRows, kTileRows), work[at].rows);
+      work[at].pilot = tuner.measure(work[at].rows);
     });
-    for (std::size_t i = 0; i < count; ++i) take(work[i].rows);
+    for (std::size_t i = 0; i < count; ++i) tuner.add(std::move(work[i].pilot));
     done(static_cast<int>(count));
   }
   RayCounts counts;

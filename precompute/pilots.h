@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "precompute/tile_source.h"
+#include "prt/transport_writer.h"
 
 namespace haarlight {
 
@@ -21,11 +22,10 @@ std::vector<int> tiles_with_scene(TileSource::Worker& worker, std::span<const st
 std::vector<int> choose_pilots(TileSource::Worker& worker, std::span<const std::uint32_t> order,
                                int& seen);
 
-/// Traces the pilots, a thread a tile, and hands their rows to `take`, in order. `done` is told of
+/// Traces the pilots, a thread a tile, and adds them to `tuner`, in order. `done` is told of
 /// finished tiles. Returns the rays traced.
 RayCounts trace_pilots(const TileSource& source, std::span<const std::uint32_t> order,
-                       std::span<const int> pilots, int threads,
-                       const std::function<void(const TileRows&)>& take,
+                       std::span<const int> pilots, int threads, ToleranceTuner& tuner,
                        const std::function<void(int count)>& done);
 
 }  // namespace haarlight

@@ -79,7 +79,8 @@ class CostMeter {
     const double each = spent / static_cast<double>(tiles_.size());
     // Compressing and writing take about a fifth of direct light's time.
     cost.seconds = 1.1 * each * (seen_ + std::min<double>(kPilotTiles, seen_)) / thread_count();
-    const std::vector<float> thresholds = tuner.thresholds();
+    const std::vector<float> thresholds =
+        tuner.thresholds(static_cast<int>(seen_), std::min(kPilotTiles, static_cast<int>(seen_)));
     const float threshold =
         thresholds.empty() ? 0.0f : *std::max_element(thresholds.begin(), thresholds.end());
     cost.bytes = tuner.tile_bytes(threshold) * seen_;

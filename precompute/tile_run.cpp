@@ -140,9 +140,8 @@ void Run::tune() {
   const std::vector<int> pilots = choose_pilots(*scout, order_, seen);
   report_.ray_counts += scout->counts;
   tuner_.emplace(source_.layout(), options_.error);
-  report_.ray_counts += trace_pilots(
-      source_, order_, pilots, report_.workers, [&](const TileRows& rows) { tuner_->add(rows); },
-      [&](int count) {
+  report_.ray_counts +=
+      trace_pilots(source_, order_, pilots, report_.workers, *tuner_, [&](int count) {
         pilots_done_ += count;
         tell();
         if (options_.time_limit > 0 && pilots_done_ < static_cast<int>(pilots.size()) &&
@@ -151,12 +150,12 @@ void Run::tune() {
         }
       });
   pilots_done_ = kPilotTiles;
-  report_.thresholds = tuner_->thresholds();
+  report_.thresholds = tuner_->thresholds(seen);
   if (options_.max_bytes > 0 && seen > 0) {
     // A tenth more than fits: what is too much is known exactly in the end, and dropped then.
     const double entries =
         static_cast<double>(options_.max_bytes - transport_overhead_bytes(run_.info));
-    const std::vector<float> smaller = tuner_->thresholds_for_size(1.1 * entries / seen);
+    const std::vector<float> smaller = tuner_->thresholds_for_size(1.1 * entries / seen, seen);
     report_.limited_by_size = smaller != report_.thresholds;
     report_.thresholds = smaller;
   }

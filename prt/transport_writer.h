@@ -56,13 +56,28 @@ struct TileRows {
 /// Source: ours; the rule of thumb "uniform threshold on orthonormal coefficients, blocks of 16".
 class ToleranceTuner {
  public:
+  /// What one tile says of thresholds.
+  struct Pilot {
+    std::vector<double> error;   ///< [lighting][candidate]: squared error of the picture, colours
+                                 ///< applied, if what is below the candidate were dropped and the
+                                 ///< rest rounded
+    std::vector<double> energy;  ///< [lighting]: the picture squared
+    std::vector<double> scales;  ///< [candidate]: scales of blocks between it and the one before
+  };
+
   ToleranceTuner(const HaarLayout& layout, double error);
   ~ToleranceTuner();
-  void add(const TileRows& tile);         ///< not thread-safe
-  std::vector<float> thresholds() const;  ///< per band; all 0 when error == 0 or no light falls
+  Pilot measure(const TileRows& tile) const;  ///< the work; safe to call from many threads
+  void add(Pilot pilot);                      ///< not thread-safe; order does not matter
+  void add(const TileRows& tile) { add(measure(tile)); }
+  /// Per band; all 0 when error == 0 or no light falls. The pilots are a sample of `tiles` tiles
+  /// (0: of very many), of which others are measured in the end: thresholds are such that these
+  /// stay below the error by two standard deviations of the difference. `of`: what as many pilots
+  /// would have led to (0: those that there are).
+  std::vector<float> thresholds(int tiles = 0, int of = 0) const;
   /// The same, but high enough for the mean of the tiles to have at most `tile_bytes` bytes in a
   /// file, as far as can be told before.
-  std::vector<float> thresholds_for_size(double tile_bytes) const;
+  std::vector<float> thresholds_for_size(double tile_bytes, int tiles = 0) const;
   /// Bytes of the mean tile in a file at a threshold, about.
   double tile_bytes(float threshold) const;
 
