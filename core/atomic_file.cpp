@@ -41,8 +41,7 @@ fs::path rename_target(const fs::path& file) {
   return target;
 }
 
-/// ".name.tmp-PID-N.suffix" beside the final file. The suffix stays, since writers choose the
-/// format by it; process and counter keep names apart.
+/// ".name.tmp-PID-N.suffix" beside the final file; process and counter keep names apart.
 fs::path temporary_name(const fs::path& target) {
   static std::atomic<unsigned> counter{0};
   const std::string name = fmt::format(".{}.tmp-{}-{}{}", target.stem().string(), ::getpid(),
@@ -89,22 +88,6 @@ void write_fully(int descriptor, std::uint64_t offset, const void* bytes, std::s
   }
 }
 
-/// Removes the temporary when left without keep().
-class TemporaryGuard {
- public:
-  explicit TemporaryGuard(const fs::path& path) : path_(path) {}
-  ~TemporaryGuard() {
-    if (!kept_) ::unlink(path_.c_str());
-  }
-  TemporaryGuard(const TemporaryGuard&) = delete;
-  TemporaryGuard& operator=(const TemporaryGuard&) = delete;
-  void keep() { kept_ = true; }
-
- private:
-  const fs::path& path_;
-  bool kept_ = false;
-};
-
 }  // namespace
 
 AtomicFile::AtomicFile(const fs::path& final_path)
@@ -137,28 +120,6 @@ void AtomicFile::commit() {
   descriptor_ = -1;
   if (result != 0) fail(final_path_, "cannot close", errno);
   sync_folder_of(target_path_, final_path_);
-}
-
-void write_atomically(const fs::path& final_path,
-                      const std::function<void(const fs::path& temporary)>& write) {
-  const fs::path target = rename_target(final_path);
-  fs::path temporary;
-  // Created here first: the system's own reason for a refusal is better than any writer's.
-  ::close(create_temporary(target, final_path, temporary));
-  TemporaryGuard guard(temporary);
-  write(temporary);
-
-  const int descriptor = ::open(temporary.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) fail(final_path, "cannot open what was written", errno);
-  const int result = ::fsync(descriptor);
-  const int error_number = errno;
-  ::close(descriptor);
-  if (result != 0) fail(final_path, "cannot sync", error_number);
-  if (::rename(temporary.c_str(), target.c_str()) != 0) {
-    fail(final_path, "cannot rename into place", errno);
-  }
-  guard.keep();
-  sync_folder_of(target, final_path);
 }
 
 }  // namespace haarlight

@@ -5,8 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
-#include <string>
 
 namespace haarlight {
 
@@ -32,10 +30,5 @@ class AtomicFile {
   int descriptor_ = -1;
   std::uint64_t size_ = 0;
 };
-
-/// Same promise for code that insists on opening its own file: `write` is called with the temporary
-/// path (same folder, same suffix) and what it leaves there is synced and renamed.
-void write_atomically(const std::filesystem::path& final_path,
-                      const std::function<void(const std::filesystem::path& temporary)>& write);
 
 }  // namespace haarlight

@@ -2,6 +2,7 @@
 
 #include "core/image_io.h"
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
 #include <unistd.h>
@@ -30,6 +31,10 @@ static_assert(sizeof(Rgb) == 3 * sizeof(float), "pixels are handed over as packe
 /// A header can promise any size; this many pixels (16384 x 16384) is more than any light probe
 /// and little enough to allocate.
 constexpr std::int64_t kMostPixels = std::int64_t{1} << 28;
+
+/// Deflate packs 1032 to 1, and a pixel has at least one bit: no format of pictures does better.
+/// What a few bytes of header promise is not allocated.
+constexpr std::uintmax_t kMostPixelsAByte = 16384;
 
 /// OpenImageIO's messages may have several lines and an end of line.
 std::string one_line(std::string text) {
@@ -86,6 +91,14 @@ void check_shape(const fs::path& file, const OIIO::ImageSpec& spec) {
          fmt::format("has {}x{} pixels, expected at most {} in all", spec.width, spec.height,
                      kMostPixels));
   }
+  std::error_code error;
+  const std::uintmax_t bytes = fs::file_size(file, error);
+  if (!error && static_cast<std::uintmax_t>(spec.width) * static_cast<std::uintmax_t>(spec.height) >
+                    kMostPixelsAByte * bytes) {
+    fail(ErrorKind::format, file,
+         fmt::format("has {}x{} pixels in {} bytes, expected more of them: is it cut short?",
+                     spec.width, spec.height, bytes));
+  }
 }
 
 std::unique_ptr<OIIO::ImageInput> open_input(const fs::path& file) {
@@ -107,21 +120,31 @@ void check_complete(const fs::path& file, const OIIO::ImageInput& input, bool su
   fail(ErrorKind::format, file, "is cut short or damaged: " + one_line(input.geterror()));
 }
 
-void write_float_picture(const fs::path& temporary, const fs::path& file, const Image& image,
-                         bool with_compression) {
+// The bytes of a picture's file. They are made in memory, and written by AtomicFile: writers of
+// pictures buffer, and a disk that is full when their last buffer goes out is no error to all of
+// them.
+std::vector<unsigned char> encode(const fs::path& file, const OIIO::ImageSpec& spec,
+                                  const void* pixels) {
+  OIIO::Filesystem::IOVecOutput memory;
+  auto output = OIIO::ImageOutput::create(file.string());
+  if (!output) fail(ErrorKind::io, file, "cannot write: " + one_line(OIIO::geterror()));
+  if (!output->set_ioproxy(&memory) || !output->open(file.string(), spec) ||
+      !output->write_image(spec.format, pixels) || !output->close()) {
+    fail(ErrorKind::io, file, "cannot write: " + one_line(output->geterror()));
+  }
+  return memory.buffer();
+}
+
+std::vector<unsigned char> encode_floats(const fs::path& file, const Image& image,
+                                         bool with_compression) {
   OIIO::ImageSpec spec(image.width, image.height, 3, OIIO::TypeDesc::FLOAT);
   if (with_compression) spec.attribute("compression", "zip");
   // EXR would be stamped with the time of writing, and equal pictures would differ as files.
   spec.attribute("DateTime", "2000:01:01 00:00:00");
-  auto output = OIIO::ImageOutput::create(temporary.string());
-  if (!output) fail(ErrorKind::io, file, "cannot write: " + one_line(OIIO::geterror()));
-  if (!output->open(temporary.string(), spec) ||
-      !output->write_image(OIIO::TypeDesc::FLOAT, image.pixels.data()) || !output->close()) {
-    fail(ErrorKind::io, file, "cannot write: " + one_line(output->geterror()));
-  }
+  return encode(file, spec, image.pixels.data());
 }
 
-void write_png(const fs::path& temporary, const fs::path& file, const Image& image) {
+std::vector<unsigned char> encode_png(const fs::path& file, const Image& image) {
   std::vector<std::uint8_t> bytes;
   bytes.reserve(3 * image.pixels.size());
   for (const Rgb& pixel : image.pixels) {
@@ -131,12 +154,7 @@ void write_png(const fs::path& temporary, const fs::path& file, const Image& ima
   }
   OIIO::ImageSpec spec(image.width, image.height, 3, OIIO::TypeDesc::UINT8);
   spec.attribute("oiio:ColorSpace", "sRGB");
-  auto output = OIIO::ImageOutput::create(temporary.string());
-  if (!output) fail(ErrorKind::io, file, "cannot write: " + one_line(OIIO::geterror()));
-  if (!output->open(temporary.string(), spec) ||
-      !output->write_image(OIIO::TypeDesc::UINT8, bytes.data()) || !output->close()) {
-    fail(ErrorKind::io, file, "cannot write: " + one_line(output->geterror()));
-  }
+  return encode(file, spec, bytes.data());
 }
 
 }  // namespace
@@ -194,13 +212,11 @@ void save_image(const fs::path& file, const Image& image) {
          fmt::format("picture to write is {}x{} with {} pixels, expected width x height, not zero",
                      image.width, image.height, image.pixels.size()));
   }
-  write_atomically(file, [&](const fs::path& temporary) {
-    if (suffix == ".png") {
-      write_png(temporary, file, image);
-    } else {
-      write_float_picture(temporary, file, image, suffix == ".exr");
-    }
-  });
+  AtomicFile out(file);  // first, so that a place that cannot be written to costs no work
+  const std::vector<unsigned char> bytes =
+      suffix == ".png" ? encode_png(file, image) : encode_floats(file, image, suffix == ".exr");
+  out.write(bytes.data(), bytes.size());
+  out.commit();
 }
 
 }  // namespace haarlight

@@ -196,6 +196,9 @@ TEST(ImageIo, WhatIsNoPictureIsRefused) {
   // A header that promises 10^10 pixels, with none behind it.
   write_bytes(folder / "huge.hdr", "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 100000 +X 100000\n");
   EXPECT_EQ(load_error(folder / "huge.hdr"), ErrorKind::format);
+  // One that may be, but not in 60 bytes: refused before 3 GiB are asked for.
+  write_bytes(folder / "large.hdr", "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 16000 +X 16000\n");
+  EXPECT_EQ(load_error(folder / "large.hdr"), ErrorKind::format);
 }
 
 TEST(ImageIo, SavingRefusesWhatItCannotDoAndLeavesNothing) {
