@@ -20,6 +20,7 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/picture_check.h"
 
 namespace haarlight {
 namespace {
@@ -32,9 +33,10 @@ static_assert(sizeof(Rgb) == 3 * sizeof(float), "pixels are handed over as packe
 /// and little enough to allocate.
 constexpr std::int64_t kMostPixels = std::int64_t{1} << 28;
 
-/// Deflate packs 1032 to 1, and a pixel has at least one bit: no format of pictures does better.
-/// What a few bytes of header promise is not allocated.
-constexpr std::uintmax_t kMostPixelsAByte = 16384;
+/// Bytes of pixels that a byte of file can hold: deflate packs 1032 to 1, and no format of pictures
+/// does better; but for EXR a pixel of one bit counts as a byte. What a few bytes of header promise
+/// is not allocated.
+constexpr std::uintmax_t kMostPacked = 16384, kMostPackedExr = 2048;
 
 /// OpenImageIO's messages may have several lines and an end of line.
 std::string one_line(std::string text) {
@@ -93,8 +95,8 @@ void check_shape(const fs::path& file, const OIIO::ImageSpec& spec) {
   }
   std::error_code error;
   const std::uintmax_t bytes = fs::file_size(file, error);
-  if (!error && static_cast<std::uintmax_t>(spec.width) * static_cast<std::uintmax_t>(spec.height) >
-                    kMostPixelsAByte * bytes) {
+  const bool exr = file.extension() == ".exr" || file.extension() == ".EXR";
+  if (!error && spec.image_bytes(true) > (exr ? kMostPackedExr : kMostPacked) * bytes) {
     fail(ErrorKind::format, file,
          fmt::format("has {}x{} pixels in {} bytes, expected more of them: is it cut short?",
                      spec.width, spec.height, bytes));
@@ -103,6 +105,7 @@ void check_shape(const fs::path& file, const OIIO::ImageSpec& spec) {
 
 std::unique_ptr<OIIO::ImageInput> open_input(const fs::path& file) {
   check_readable(file);
+  check_picture_parts(file);
   // Colours must come as they are stored: a texture's alpha is no reason to darken them.
   OIIO::ImageSpec hints;
   hints.attribute("oiio:UnassociatedAlpha", 1);

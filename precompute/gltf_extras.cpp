@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/json_depth.h"
 
 namespace haarlight {
 namespace {
@@ -212,7 +213,13 @@ std::string json_text(const std::filesystem::path& file) {
 
 GltfExtras read_gltf_extras(const std::filesystem::path& file) {
   try {
-    const json parsed = json::parse(json_text(file));
+    const std::string text = json_text(file);
+    if (json_nests_too_deep(text)) {
+      throw Error(ErrorKind::format,
+                  fmt::format("{}: its JSON nests deeper than {}, expected glTF 2.0", file.string(),
+                              kMostJsonDepth));
+    }
+    const json parsed = json::parse(text);
     GltfExtras extras;
     extras.material = gltf_materials(parsed);
     const std::set<std::size_t> meshes = meshes_in_scene(parsed, file.string());

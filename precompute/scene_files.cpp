@@ -15,6 +15,7 @@
 #include <sstream>
 
 #include "core/error.h"
+#include "core/json_depth.h"
 #include "precompute/content_hash.h"
 
 namespace haarlight {
@@ -68,6 +69,7 @@ nlohmann::json gltf_json(const std::string& bytes) {
     std::memcpy(&length, bytes.data() + 12, sizeof length);
     text = bytes.substr(20, length);
   }
+  if (json_nests_too_deep(text)) return {};
   return nlohmann::json::parse(text, nullptr, false);
 }
 

@@ -10,6 +10,8 @@
 #include <optional>
 
 #include "core/error.h"
+#include "core/json_depth.h"
+#include "prt/transport_assembly.h"
 #include "prt/transport_format.h"
 
 namespace haarlight {
@@ -48,6 +50,22 @@ Camera camera_of(const nlohmann::json& j) {
   camera.width = j.at("width").get<int>();
   camera.height = j.at("height").get<int>();
   return camera;
+}
+
+// What whoever joins journals relies on.
+void check_head(const JournalHead& head) {
+  const auto wrong = [](const std::string& what) { return Error(ErrorKind::format, what); };
+  check_info(head.info);
+  const HaarLayout layout(head.info.face_size);
+  if (head.thresholds.size() != static_cast<std::size_t>(layout.band_count())) {
+    throw wrong(fmt::format("{} thresholds, expected {}, one a band", head.thresholds.size(),
+                            layout.band_count()));
+  }
+  if (head.meta.empty()) return;
+  if (json_nests_too_deep(head.meta) ||
+      !nlohmann::json::parse(head.meta, nullptr, false).is_object()) {
+    throw wrong("its description is no JSON object");
+  }
 }
 
 }  // namespace
@@ -118,10 +136,16 @@ JournalHead unpack_head(std::span<const std::byte> bytes, const std::string& nam
   if (XXH3_64bits(body.data(), body.size()) != fixed.hash) throw refuse("its head is damaged");
   try {
     const char* text = reinterpret_cast<const char*>(body.data());
+    if (fixed.text > body.size() || json_nests_too_deep({text, fixed.text})) {
+      throw refuse("its head cannot be read");
+    }
     const nlohmann::json j = nlohmann::json::parse(text, text + fixed.text);
     JournalHead head;
     TransportInfo& info = head.info;
     info.kind = static_cast<TransportKind>(j.at("kind").get<int>());
+    if (info.kind < TransportKind::image || info.kind > TransportKind::clusters) {
+      throw refuse("is of a kind that is not known");
+    }
     info.face_size = j.at("face_size").get<int>();
     info.width = j.at("width").get<int>();
     info.height = j.at("height").get<int>();
@@ -160,7 +184,12 @@ JournalHead unpack_head(std::span<const std::byte> bytes, const std::string& nam
     head.max_bytes = j.at("max_bytes").get<std::uint64_t>();
     head.shard = {j.at("shard").at(0).get<int>(), j.at("shard").at(1).get<int>()};
     head.tiles = j.at("tiles").get<int>();
+    check_head(head);
     return head;
+  } catch (const Error& error) {
+    const std::string what = error.what();
+    if (what.starts_with(name)) throw;
+    throw refuse("its head is of no transport (" + what + ")");
   } catch (const nlohmann::json::exception&) {
     throw refuse("its head cannot be read");
   }

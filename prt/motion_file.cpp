@@ -13,6 +13,7 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/json_depth.h"
 
 namespace haarlight {
 namespace {
@@ -201,6 +202,9 @@ json frame_json(const RecordedFrame& frame, const RecordedFrame& before) {
 }  // namespace
 
 MotionRecording parse_motion(const std::string& text, const std::string& name) {
+  if (json_nests_too_deep(text)) {
+    refuse(name, fmt::format("nests deeper than {}, expected a recorded motion", kMostJsonDepth));
+  }
   json root;
   try {
     root = json::parse(text);

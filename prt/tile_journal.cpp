@@ -68,7 +68,7 @@ std::vector<std::byte> read_head(int descriptor, std::uint64_t file_size,
 }  // namespace
 
 TileJournal::TileJournal(const std::filesystem::path& file, const JournalHead& head, bool resume)
-    : file_(file), head_(head), places_(static_cast<std::size_t>(head.tiles)) {
+    : file_(file), head_(head) {
   const std::optional<JournalHead> found = resume ? peek(file) : std::nullopt;
   descriptor_ = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (descriptor_ < 0) refuse(file, "cannot be created");
@@ -105,7 +105,6 @@ TileJournal::TileJournal(const std::filesystem::path& file) : file_(file) {
       throw Error(ErrorKind::format,
                   fmt::format("{}: {} tiles, expected at most 2^25", file.string(), head_.tiles));
     }
-    places_.resize(static_cast<std::size_t>(head_.tiles));
     scan(bytes.size(), file_size);
   } catch (...) {
     ::close(descriptor_);
@@ -142,7 +141,7 @@ void TileJournal::scan(std::uint64_t begin, std::uint64_t file_size) {
     if (!size) break;
     bytes.resize(*size);
     if (!read_all(descriptor_, bytes, end_, file_) || !packed_record_is_whole(bytes)) break;
-    places_[static_cast<std::size_t>(packed_record_tile(bytes))] = {end_, *size};
+    places_[packed_record_tile(bytes)] = {end_, *size};
     end_ += *size;
   }
 }
@@ -151,13 +150,20 @@ bool TileJournal::has(int tile) const { return record_bytes(tile) > 0; }
 
 std::uint64_t TileJournal::record_bytes(int tile) const {
   const std::lock_guard lock(mutex_);
-  return places_[static_cast<std::size_t>(tile)].size;
+  const auto found = places_.find(tile);
+  return found == places_.end() ? 0 : found->second.size;
 }
 
 int TileJournal::count() const {
   const std::lock_guard lock(mutex_);
-  return static_cast<int>(
-      std::count_if(places_.begin(), places_.end(), [](const Place& p) { return p.size > 0; }));
+  return static_cast<int>(places_.size());
+}
+
+int TileJournal::count(int first, int step) const {
+  const std::lock_guard lock(mutex_);
+  return static_cast<int>(std::count_if(places_.begin(), places_.end(), [&](const auto& place) {
+    return place.first >= first && (place.first - first) % step == 0;
+  }));
 }
 
 void TileJournal::append(std::span<const std::byte> record) {
@@ -172,7 +178,7 @@ void TileJournal::append(std::span<const std::byte> record) {
   const int tile = packed_record_tile(record);
   const std::lock_guard lock(mutex_);
   write_all(descriptor_, record, end_, file_);
-  places_[static_cast<std::size_t>(tile)] = {end_, record.size()};
+  places_[tile] = {end_, record.size()};
   end_ += record.size();
 }
 
@@ -180,7 +186,8 @@ std::optional<TileRecord> TileJournal::read(int tile) const {
   Place place;
   {
     const std::lock_guard lock(mutex_);
-    place = places_[static_cast<std::size_t>(tile)];
+    const auto found = places_.find(tile);
+    if (found != places_.end()) place = found->second;
   }
   if (place.size == 0) return std::nullopt;
   std::vector<std::byte> bytes(place.size);

@@ -9,6 +9,7 @@
 #include <mutex>
 #include <optional>
 #include <span>
+#include <unordered_map>
 #include <vector>
 
 #include "prt/journal_head.h"
@@ -36,6 +37,8 @@ class TileJournal {
   const std::filesystem::path& file() const { return file_; }
   bool has(int tile) const;
   int count() const;
+  /// How many of the tiles `first`, first + step, ... there are.
+  int count(int first, int step) const;
   /// Bytes of a tile's record; 0 if it was never written.
   std::uint64_t record_bytes(int tile) const;
   /// Appends a packed record (see pack_record), whole or not at all. Thread-safe. Throws Error{io},
@@ -56,7 +59,7 @@ class TileJournal {
   JournalHead head_;
   int descriptor_ = -1;
   std::uint64_t end_ = 0;
-  std::vector<Place> places_;
+  std::unordered_map<int, Place> places_;  // by tile: no larger than what the file holds
   mutable std::mutex mutex_;
 };
 

@@ -15,6 +15,7 @@
 #include "core/error.h"
 #include "core/huge_page_vector.h"
 #include "core/input_file.h"
+#include "core/json_depth.h"
 #include "core/parallel.h"
 #include "prt/chunk.h"
 #include "prt/transport_data.h"
@@ -24,18 +25,22 @@
 namespace haarlight {
 namespace {
 
+// The system grants more memory than there is, and kills whoever uses it.
+void check_memory(std::uint64_t size, const std::string& name) {
+  const auto pages = static_cast<std::uint64_t>(std::max(0L, ::sysconf(_SC_PHYS_PAGES)));
+  const auto page = static_cast<std::uint64_t>(std::max(0L, ::sysconf(_SC_PAGESIZE)));
+  if (size > pages * page) {
+    throw Error(ErrorKind::io, fmt::format("{}: needs {} bytes of memory, this machine has {}",
+                                           name, size, pages * page));
+  }
+}
+
 /// Memory of the chunks, in huge pages. Nothing is written to it before it is read into: pages go
 /// to the node of the thread that reads them.
 class ChunkMemory {
  public:
   ChunkMemory(std::size_t size, const std::string& name) : size_(size) {
-    // The system grants more than there is, and kills whoever uses it.
-    const auto pages = static_cast<std::uint64_t>(std::max(0L, ::sysconf(_SC_PHYS_PAGES)));
-    const auto page = static_cast<std::uint64_t>(std::max(0L, ::sysconf(_SC_PAGESIZE)));
-    if (size > pages * page) {
-      throw Error(ErrorKind::io, fmt::format("{}: needs {} bytes of memory, this machine has {}",
-                                             name, size, pages * page));
-    }
+    check_memory(size, name);
     if (size > 0) data_ = HugePageAllocator<std::byte>().allocate(size);
   }
   ~ChunkMemory() {
@@ -74,8 +79,9 @@ void check_place(const InputFile& file, const FileSection& section, const std::s
   }
 }
 
-/// Room for the description.
+/// Room for the description, and for named sections: as many bytes, and some for every vertex.
 constexpr std::uint64_t kMaxMetaBytes = std::uint64_t{64} << 20;
+constexpr std::uint64_t kMaxNamedBytes = std::uint64_t{1} << 30, kMaxNamedVertexBytes = 2048;
 
 // The bytes of a section, inside the file, of at most `most` bytes and with the right hash.
 std::vector<std::byte> section_bytes(const InputFile& file, const FileSection& section,
@@ -86,6 +92,7 @@ std::vector<std::byte> section_bytes(const InputFile& file, const FileSection& s
     damaged(name, fmt::format("{} has the wrong size: {} bytes, expected at most {}", what,
                               section.size, most));
   }
+  check_memory(section.size, name);
   std::vector<std::byte> bytes(section.size);
   read_section(file, section, bytes, name, what);
   return bytes;
@@ -202,7 +209,7 @@ void read_named(const InputFile& input, const TransportHeader& header, const std
                                        view       ? "view factors"
                                        : clusters ? "clusters"
                                                   : "a section of unknown name",
-                                       input.size());
+                                       kMaxNamedBytes + kMaxNamedVertexBytes * vertices);
     if ((view && info.view) || (clusters && info.clusters)) {
       damaged(name, "a section is there twice");
     }
@@ -266,10 +273,13 @@ Transport Transport::open(const std::filesystem::path& file) {
   auto data = std::make_shared<Data>(static_cast<int>(header.face_size));
   data->info =
       info_of(header, section_bytes(input, header.meta, name, "description", kMaxMetaBytes));
+  if (json_nests_too_deep(data->info.meta)) damaged(name, "description nests too deep");
   const std::vector<FileSection> sections = read_chunk_table(input, header, name);
   if (header.kind > 0) {
     data->info.mesh = std::make_shared<const TransportMesh>(
-        unpack_mesh(section_bytes(input, header.mesh, name, "mesh", input.size()),
+        unpack_mesh(section_bytes(input, header.mesh, name, "mesh",
+                                  ZSTD_compressBound(24 + std::size_t{28} * header.vertices +
+                                                     std::size_t{12} * header.triangles)),
                     {header.vertices, header.triangles, header.mesh_materials == 1}, name));
   }
   read_named(input, header, name, data->info);

@@ -70,11 +70,9 @@ void check_whole(const Journals& journals, const std::filesystem::path& file) {
                   fmt::format("{}: shard {} of {} was not given, expected all of them",
                               file.string(), i + 1, count));
     }
-    int missing = 0, wanted = 0;
-    for (int tile = i; tile < journal->head().tiles; tile += count) {
-      ++wanted;
-      if (!journal->has(tile)) ++missing;
-    }
+    const int tiles = journal->head().tiles;
+    const int wanted = i < tiles ? (tiles - i - 1) / count + 1 : 0;
+    const int missing = wanted - journal->count(i, count);
     if (missing > 0) {
       refuse(*journal, fmt::format("{} of its {} tiles are still to be traced, expected none: run "
                                    "its command again with --resume",
@@ -91,6 +89,13 @@ TransportSummary merge_transport(const std::filesystem::path& file,
   const Journals journals = open_all(shards);
   check_whole(journals, file);
   const JournalHead& head = journals.front()->head();
+  // Tiles are there, and so their bytes; outputs are so far only a number that a head tells.
+  if (head.info.output_count() > static_cast<std::size_t>(head.tiles) * kTileRows) {
+    throw Error(ErrorKind::format,
+                fmt::format("{}: {} outputs in {} tiles, expected at most {} in each",
+                            journals.front()->file().string(), head.info.output_count(), head.tiles,
+                            kTileRows));
+  }
   AssemblyInput input{head, head.meta, {}, head.tiles, thread_count()};
   input.record = [&](int tile) {
     const TileJournal& journal = *journals[static_cast<std::size_t>(tile) % journals.size()];

@@ -22,6 +22,8 @@ haarlight_hard_test(long SOURCES long_run USES haarlight_prt)
 haarlight_hard_test(geometry SOURCES geometry_lobes geometry_rays USES haarlight_precompute)
 haarlight_hard_test(determinism SOURCES determinism USES haarlight_precompute XxHash::XxHash)
 
+haarlight_hard_test(files SOURCES files_damage USES haarlight_fuzz_targets XxHash::XxHash)
+
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
 add_test(NAME HardCases.PlantedFaultsFitTheTree
   COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_LIST_DIR}/planted.py --apply-only)
