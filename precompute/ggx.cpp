@@ -123,7 +123,7 @@ class AlbedoTable {
     const auto [c, fc] = place(cosine, kCosines);
     const Bsdf::LobeValues* low = &node_[a * kCosines + c];
     const Bsdf::LobeValues* high = low + kCosines;
-    const auto mix = [&](double ll, double lh, double hl, double hh) {
+    const auto mix = [fa = fa, fc = fc](double ll, double lh, double hl, double hh) {
       return (1 - fa) * ((1 - fc) * ll + fc * lh) + fa * ((1 - fc) * hl + fc * hh);
     };
     return {mix(low[0].first, low[1].first, high[0].first, high[1].first),

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Installs the Debian packages that Haarlight needs, those that are missing only.
 #
-#   scripts/install_packages.sh [build] [demo] [test]      (nothing: all three)
+#   scripts/install_packages.sh [build] [demo] [test]      (nothing: these three)
+#   scripts/install_packages.sh check                      (for sanitizers, fuzzers and valgrind)
 #
 # As root, or as a user with sudo. Debian 12; asks no questions.
 set -euo pipefail
@@ -15,6 +16,8 @@ demo=(python3 python3-numpy python3-matplotlib)
 test=(python3 python3-numpy python3-matplotlib libgtest-dev librapidcheck-dev libbenchmark-dev
   xvfb xauth libgl1-mesa-dri libgl1)
 
+check=(clang libclang-rt-14-dev libomp-dev valgrind assimp-testmodels)
+
 groups=("$@")
 if [ ${#groups[@]} -eq 0 ]; then groups=(build demo test); fi
 wanted=()
@@ -23,8 +26,9 @@ for group in "${groups[@]}"; do
     build) wanted+=("${build[@]}") ;;
     demo) wanted+=("${demo[@]}") ;;
     test) wanted+=("${test[@]}") ;;
+    check) wanted+=("${check[@]}") ;;
     *)
-      echo "install_packages.sh: group '$group' is not known, wanted build, demo or test" >&2
+      echo "install_packages.sh: group '$group' is not known, wanted build, demo, test or check" >&2
       exit 2
       ;;
   esac

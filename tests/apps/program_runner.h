@@ -42,10 +42,11 @@ class Program {
  public:
   /// `starter`: words before the program's own, as of mpirun.
   Program(const std::vector<std::string>& arguments, const std::filesystem::path& folder,
-          const std::vector<std::string>& starter = {})
+          const std::vector<std::string>& starter = {},
+          const std::string& program = HAARLIGHT_PROGRAM)
       : out_(folder / ".stdout"), err_(folder / ".stderr") {
     std::vector<std::string> words = starter;
-    words.push_back(HAARLIGHT_PROGRAM);
+    words.push_back(program);
     words.insert(words.end(), arguments.begin(), arguments.end());
     std::vector<char*> argv;
     for (std::string& word : words) argv.push_back(word.data());
@@ -64,7 +65,7 @@ class Program {
                                      O_WRONLY | O_CREAT | O_TRUNC, 0644);
     const int error = posix_spawn(&process_, argv[0], &actions, nullptr, argv.data(), environ);
     posix_spawn_file_actions_destroy(&actions);
-    if (error != 0) throw std::runtime_error("cannot start " HAARLIGHT_PROGRAM);
+    if (error != 0) throw std::runtime_error("cannot start " + program);
   }
 
   bool running() {

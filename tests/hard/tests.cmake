@@ -24,6 +24,24 @@ haarlight_hard_test(determinism SOURCES determinism USES haarlight_precompute Xx
 
 haarlight_hard_test(files SOURCES files_damage USES haarlight_fuzz_targets XxHash::XxHash)
 
+# A library preloaded into the programs under test, which makes their writes fail; and a program that
+# writes what haarlight writes beside transports and pictures.
+add_library(haarlight_fault_shim SHARED hard/fault_shim.cpp)
+target_include_directories(haarlight_fault_shim PRIVATE ${PROJECT_SOURCE_DIR})
+target_link_libraries(haarlight_fault_shim PRIVATE haarlight_flags ${CMAKE_DL_LIBS})
+# It stands before all else in the program, where a sanitizer's own library is not there yet.
+target_compile_options(haarlight_fault_shim PRIVATE -fno-sanitize=all)
+target_link_options(haarlight_fault_shim PRIVATE -fno-sanitize=all)
+add_executable(haarlight-fault-writer hard/fault_writer.cpp)
+target_include_directories(haarlight-fault-writer PRIVATE ${PROJECT_SOURCE_DIR})
+target_link_libraries(haarlight-fault-writer PRIVATE haarlight_prt haarlight_flags fmt::fmt)
+haarlight_hard_test(faults SOURCES files_faults USES haarlight_core)
+target_compile_definitions(test_hard_faults PRIVATE
+  HAARLIGHT_PROGRAM="$<TARGET_FILE:haarlight>"
+  HAARLIGHT_FAULT_SHIM="$<TARGET_FILE:haarlight_fault_shim>"
+  HAARLIGHT_FAULT_WRITER="$<TARGET_FILE:haarlight-fault-writer>")
+add_dependencies(test_hard_faults haarlight haarlight_fault_shim haarlight-fault-writer)
+
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
 add_test(NAME HardCases.PlantedFaultsFitTheTree
   COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_LIST_DIR}/planted.py --apply-only)
