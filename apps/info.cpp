@@ -63,6 +63,24 @@ std::string scene_state_of(const std::filesystem::path& file, const Json& made) 
   return "not found";
 }
 
+Json describe_clusters(const TransportInfo& info) {
+  const ClusterWeights& w = *info.clusters;
+  std::vector<std::uint32_t> vertices, vectors;
+  for (std::size_t c = 0; c < static_cast<std::size_t>(w.clusters()); ++c) {
+    vertices.push_back(w.vertices_of(c));
+    vectors.push_back(w.vectors_of(c));
+  }
+  const auto [fewest_vertices, most_vertices] =
+      std::minmax_element(vertices.begin(), vertices.end());
+  const auto [fewest, most] = std::minmax_element(vectors.begin(), vectors.end());
+  return {{"count", w.clusters()},
+          {"vertices", {{"min", *fewest_vertices}, {"max", *most_vertices}}},
+          {"vectors", {{"min", *fewest}, {"max", *most}, {"sum", w.vectors()}}},
+          {"weight_bits", w.bits},
+          {"weight_bytes", w.weight.size() * static_cast<std::size_t>(w.bits) / 8},
+          {"tinted", !w.tint.empty()}};
+}
+
 Json describe(const std::filesystem::path& file, const Transport& transport) {
   const TransportInfo& info = transport.info();
   const ColumnSizes columns = column_sizes(transport);
@@ -90,12 +108,13 @@ Json describe(const std::filesystem::path& file, const Transport& transport) {
   out["file"] = file.string();
   out["file_bytes"] = transport.file_bytes();
   out["chunk_bytes"] = transport.chunk_bytes();
-  out["kind"] = info.mesh ? "mesh" : "image";
+  out["kind"] = info.clusters ? "clusters" : info.mesh ? "mesh" : "image";
   if (info.mesh) {
     out["vertices"] = info.mesh->position.size();
     out["triangles"] = info.mesh->triangle.size();
     out["terms"] = info.terms;
   }
+  if (info.clusters) out["clusters"] = describe_clusters(info);
   out["face_size"] = info.face_size;
   out["coefficients"] = transport.layout().size();
   out["width"] = info.width;
@@ -136,12 +155,25 @@ void print_effects(const Json& made) {
   }
 }
 
+// Of a compressed transport: what it was made from.
+void print_source(const Json& source) {
+  if (!source.is_object() || !source.contains("file_bytes") || !source["file_bytes"].is_number()) {
+    return;
+  }
+  std::string error;
+  if (source.contains("measured_error") && source["measured_error"].is_number()) {
+    error = fmt::format(", itself with an error of {:.3g}", source["measured_error"].get<double>());
+  }
+  fmt::print("{:<22}{}{}\n", "compressed from", mebibytes(source["file_bytes"].get<double>()),
+             error);
+}
+
 void print_text(const Json& d) {
   const auto line = [](const std::string& name, const std::string& value) {
     fmt::print("{:<22}{}\n", name, value);
   };
   line("file", fmt::format("{}, {}", d["file"].get<std::string>(), mebibytes(d["file_bytes"])));
-  const bool mesh = d["kind"] == "mesh";
+  const bool mesh = d["kind"] != "image";
   if (mesh) {
     line("mesh", fmt::format("{} vertices, {} triangles, {} term{} a vertex; shown at {}x{} pixels",
                              d["vertices"].get<std::int64_t>(), d["triangles"].get<std::int64_t>(),
@@ -150,6 +182,17 @@ void print_text(const Json& d) {
   } else {
     line("picture", fmt::format("{}x{} pixels, {} of them show the scene", d["width"].get<int>(),
                                 d["height"].get<int>(), d["pixels_covered"].get<std::int64_t>()));
+  }
+  if (d.contains("clusters")) {
+    const Json& c = d["clusters"];
+    line("clusters",
+         fmt::format("{} of {} to {} vertices, with {} to {} vectors, {} together; weights of {} "
+                     "bits, {}{}",
+                     c["count"].get<int>(), c["vertices"]["min"].get<int>(),
+                     c["vertices"]["max"].get<int>(), c["vectors"]["min"].get<int>(),
+                     c["vectors"]["max"].get<int>(), c["vectors"]["sum"].get<int>(),
+                     c["weight_bits"].get<int>(), mebibytes(c["weight_bytes"]),
+                     c["tinted"].get<bool>() ? "; vertices have colours of their own" : ""));
   }
   line("lighting", fmt::format("6x{0}x{0} texels, {1} coefficients", d["face_size"].get<int>(),
                                d["coefficients"].get<int>()));
@@ -162,7 +205,10 @@ void print_text(const Json& d) {
                    camera["forward"][1].get<double>(), camera["forward"][2].get<double>(),
                    camera["vertical_fov_degrees"].get<double>()));
   line("rows", fmt::format("{} {} in {} stored rows", d["rows"].get<std::int64_t>(),
-                           mesh ? "vertex terms" : "pixels", d["rows_stored"].get<int>()));
+                           d.contains("clusters") ? "vector terms"
+                           : mesh                 ? "vertex terms"
+                                                  : "pixels",
+                           d["rows_stored"].get<int>()));
   const Json& columns = d["column_bytes"];
   line("columns", fmt::format("{} together; one is {} in the mean, {} to {}, median {}",
                               mebibytes(d["chunk_bytes"]), kibibytes(columns["mean"]),
@@ -190,6 +236,9 @@ void print_text(const Json& d) {
   print_effects(d["made"]);
   for (const auto& [key, value] : d["made"].items()) {
     if (key == "measured_error" || key == "effects" || key == "plan") continue;
+    if (key == "compressed" && value.is_object() && value.contains("source")) {
+      print_source(value["source"]);
+    }
     line("made: " + key, value.dump());
   }
 }

@@ -68,6 +68,8 @@ int main(int argc, char** argv) {
       haarlight::add_plan);
   add("precompute", "Traces a scene's transport for one view and writes it to a file",
       haarlight::add_precompute);
+  add("compress", "Makes a mesh's transport smaller and faster: clustered PCA",
+      haarlight::add_compress);
   add("relight", "Relights a transport file under a moving environment; pictures and metrics",
       haarlight::add_relight);
   add("compare", "Says how far apart two pictures are", haarlight::add_compare);

@@ -18,6 +18,7 @@
 #include "apps/verbs.h"
 #include "core/image_io.h"
 #include "core/image_metrics.h"
+#include "cpca/cluster_relighter.h"
 #include "prt/completeness.h"
 #include "prt/image_relighter.h"
 #include "prt/metrics_csv.h"
@@ -43,6 +44,7 @@ struct RelightCommand {
   int every = 1;
   std::string save_frames;
   std::optional<double> exposure_ev;
+  ClusterRelightOptions clusters;
   TonemapCurve curve = TonemapCurve::filmic;
   bool no_background = false;
   std::vector<std::string> formats = kFormats;
@@ -158,7 +160,8 @@ void RelightCommand::run() const {
       const bool dark =
           replayed ? replayed->frames.front().start != FrameStart::exact : sequence.from_dark;
       exposure = auto_exposure_ev(
-          dark ? relight_picture_once(scene, frame.target, frame.view.camera) : frame.picture);
+          dark ? relight_picture_once(scene, frame.target, frame.view.camera, any_relighter())
+               : frame.picture);
     }
     if (std::binary_search(saved.begin(), saved.end(), number)) {
       Image picture = frame.picture;
@@ -176,10 +179,11 @@ void RelightCommand::run() const {
     }
     return progress((number + 1.0) / frames);
   };
+  const RelighterFactory make = any_relighter(clusters);
   if (replayed) {
-    relight_recording(scene, environments, *replayed, sequence.against_reference, frame_done);
+    relight_recording(scene, environments, *replayed, sequence.against_reference, frame_done, make);
   } else {
-    relight_sequence(scene, environments.front(), second, sequence, frame_done);
+    relight_sequence(scene, environments.front(), second, sequence, frame_done, make);
   }
   if (table) table->commit();
 }
@@ -258,6 +262,19 @@ Verb add_relight(CLI::App& verb) {
       verb, "--bands", s.lighting.band_choice,
       {{"simple", BandChoice::simple}, {"exhaustive", BandChoice::exhaustive}},
       "how pbi finds the bands to reset: by a test of each, or by trying all 2^N")
+      ->group("Method");
+  verb.add_option_function<std::string>(
+          "--basis-terms",
+          [&c](const std::string& text) {
+            c.clusters.basis_terms =
+                text == "all" ? -1
+                : text == "quarter"
+                    ? 0
+                    : static_cast<int>(parse_number("--basis-terms", text, 1, 65536));
+          },
+          "of a compressed transport: most vectors of a cluster that vertices follow in a frame "
+          "[quarter]")
+      ->type_name("quarter|all|N")
       ->group("Method");
   verb.add_flag("--from-dark", s.from_dark, "start with nothing shown; else frame 0 is exact")
       ->group("Method");

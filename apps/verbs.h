@@ -17,6 +17,7 @@ using Verb = std::function<void()>;
 
 Verb add_plan(CLI::App& verb);
 Verb add_precompute(CLI::App& verb);
+Verb add_compress(CLI::App& verb);
 Verb add_relight(CLI::App& verb);
 Verb add_compare(CLI::App& verb);
 Verb add_info(CLI::App& verb);

@@ -175,8 +175,8 @@ JournalHead unpack_head(std::span<const std::byte> bytes, const std::string& nam
           unpack_view_factors(*packed, info.terms, vertices, name));
     }
     if (const auto packed = part("clusters")) {
-      info.clusters =
-          std::make_shared<const ClusterWeights>(unpack_cluster_weights(*packed, vertices, name));
+      info.clusters = std::make_shared<const ClusterWeights>(
+          unpack_cluster_weights(*packed, vertices, info.terms, name));
     }
     head.fingerprint = j.at("fingerprint").get<std::string>();
     head.thresholds = j.at("thresholds").get<std::vector<float>>();

@@ -220,8 +220,8 @@ void read_named(const InputFile& input, const TransportHeader& header, const std
       info.view = std::make_shared<const ViewFactors>(
           unpack_view_factors(section, info.terms, vertices, name));
     } else if (clusters) {
-      info.clusters =
-          std::make_shared<const ClusterWeights>(unpack_cluster_weights(section, vertices, name));
+      info.clusters = std::make_shared<const ClusterWeights>(
+          unpack_cluster_weights(section, vertices, info.terms, name));
     }
   }
   if ((info.kind == TransportKind::clusters) != (info.clusters != nullptr)) {

@@ -54,14 +54,13 @@ struct TransportInfo {
   std::string meta;  ///< JSON object: how it was made, its options, measured error
 
   /// Rows with a meaning: pixels, vertices or vectors of clusters, times terms. Output
-  /// `i * terms + k` is term k of pixel y * width + x = i, of vertex i, or of vector s of cluster
-  /// c, c * basis + s = i.
+  /// `i * terms + k` is term k of pixel y * width + x = i or of vertex i; of clusters see
+  /// ClusterWeights.
   std::size_t output_count() const {
     const std::size_t places =
-        clusters ? static_cast<std::size_t>(clusters->clusters) *
-                       static_cast<std::size_t>(clusters->basis)
-        : mesh ? mesh->position.size()
-               : static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+        clusters ? std::size_t{clusters->vectors()}
+        : mesh   ? mesh->position.size()
+                 : static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
     return places * static_cast<std::size_t>(terms);
   }
 };

@@ -254,10 +254,11 @@ TransportSummary Assembly::run(const Progress& progress) {
           throw Error(ErrorKind::cancelled, fmt::format("{}: stopped on request", file_.string()));
         }
       });
-  summary.measured_error = error.worst();
+  summary.measured_error = input_.measured_error.value_or(error.worst());
   summary.noise = noise.worst();
 
-  const std::vector<float> norms = norms_of(energies, columns);
+  const std::vector<float> norms =
+      input_.column_norms.empty() ? norms_of(energies, columns) : input_.column_norms;
   header.column_norms = append(out, norms.data(), norms.size() * sizeof(float));
   const std::vector<std::byte> packed = pack_tables(tables_);
   header.rows = append(out, packed.data(), packed.size());
@@ -341,7 +342,8 @@ void check_info(const TransportInfo& info) {
   for (const std::string& wrong :
        {mesh ? check_mesh(*info.mesh) : std::string(),
         info.view ? check_view_factors(*info.view, vertices) : std::string(),
-        info.clusters ? check_cluster_weights(*info.clusters, vertices) : std::string()}) {
+        info.clusters ? check_cluster_weights(*info.clusters, vertices, info.terms)
+                      : std::string()}) {
     if (!wrong.empty()) throw Error(ErrorKind::invalid_argument, wrong);
   }
   if (info.output_count() > kMaxOutputs) {

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "core/progress.h"
@@ -22,6 +23,9 @@ struct AssemblyInput {
   std::function<std::shared_ptr<const TileRecord>(int tile)> record;
   int tiles_done = 0;  ///< traced; fewer than head.tiles: the file says that it is incomplete
   int workers = 1;     ///< chunks put together at a time
+  /// In place of what the records say, where there.
+  std::optional<double> measured_error{};
+  std::vector<float> column_norms{};
 };
 
 /// Writes `file`; its bytes depend on head, meta and records alone. Throws Error{io}; Error{format}

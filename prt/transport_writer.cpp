@@ -146,7 +146,22 @@ TransportSummary TransportWriter::finish(const std::string& meta, const FinishOp
                 fmt::format("{}: a shard alone makes no file, expected all of them joined",
                             s.journal->file().string()));
   }
-  AssemblyInput input{s.journal->head(), meta, {}, s.journal->count(), options.workers};
+  JournalHead head = s.journal->head();
+  if (options.clusters) {
+    head.info.clusters = options.clusters;
+    check_info(head.info);
+    if (head.info.clusters->first_vector != s.info.clusters->first_vector ||
+        head.info.clusters->first_vertex != s.info.clusters->first_vertex) {
+      throw Error(ErrorKind::invalid_argument, "the weights are of other clusters than the rows");
+    }
+  }
+  AssemblyInput input{head,
+                      meta,
+                      {},
+                      s.journal->count(),
+                      options.workers,
+                      options.measured_error,
+                      options.column_norms};
   if (input.workers < 1) input.workers = thread_count();
   input.record = [&](int tile) -> std::shared_ptr<const TileRecord> {
     if (std::optional<TileRecord> record = s.journal->read(tile)) {

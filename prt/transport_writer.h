@@ -127,6 +127,12 @@ struct FinishOptions {
   /// What to show for tiles that were never written: a preview. Called from several threads; may
   /// return null. With it the journal stays unless all tiles were there.
   std::function<std::shared_ptr<const TileRecord>(int tile)> stand_in{};
+  /// Of kind clusters: the weights, where they are found only along with the last tile. Starts of
+  /// clusters and vectors are as in the info that the writer was made with.
+  std::shared_ptr<const ClusterWeights> clusters{};
+  /// What the file says as measured_error and column norms, where rows alone do not tell them.
+  std::optional<double> measured_error{};
+  std::vector<float> column_norms{};
 };
 
 /// What a finished file is.

@@ -553,6 +553,10 @@ void Interface::draw_display(const ViewFrame& frame) {
     false_colour = shown == 3;
     if (shown < 3) curve = static_cast<TonemapCurve>(shown);
   }
+  if (frame.number > 0 && frame.scene->transport.kind() == TransportKind::clusters) {
+    ImGui::Checkbox("clusters in colours", &settings_.clusters);
+    mark("clusters");
+  }
   auto exposure = static_cast<float>(exposure_ev);
   const float button = ImGui::CalcTextSize("auto").x + 16 * static_cast<float>(scale_);
   ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x - button - 4);

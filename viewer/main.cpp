@@ -107,6 +107,8 @@ void add_options(CLI::App& app, CommandLine& c) {
       {{"none", CompareView::none}, {"split", CompareView::split}, {"side", CompareView::side}},
       "show the exact picture too [none]");
 
+  app.add_flag("--clusters", s.clusters,
+               "show a compressed transport's clusters, each in a colour, in place of its light");
   app.add_option("--frames", r.frames, "play from the start, and end after so many frames")
       ->check(CLI::Range(1, 1'000'000));
   app.add_option(

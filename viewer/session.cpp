@@ -12,6 +12,7 @@
 #include "core/image_io.h"
 #include "core/image_metrics.h"
 #include "core/parallel.h"
+#include "cpca/cluster_relighter.h"
 #include "prt/image_relighter.h"
 #include "prt/motion_background.h"
 #include "prt/tonemap.h"
@@ -149,7 +150,7 @@ void Session::open_transport(const std::filesystem::path& file) {
   // Everything that can fail is made first, so that a file that does not open changes nothing.
   LightRig rig(scene->transport.layout());
   for (std::size_t i = 0; i < lights_.size(); ++i) rig.set_environment(i, lights_[i]->environment);
-  FrameRelighter relighter(scene->transport, {}, WaveletWeight::area);
+  FrameRelighter relighter(scene->transport, {}, WaveletWeight::area, any_relighter());
   const auto& mesh = scene->transport.info().mesh;
   middle_ = mesh ? bounding_sphere(*mesh) : BoundingSphere{};
   scene_ = std::move(scene);
@@ -159,6 +160,8 @@ void Session::open_transport(const std::filesystem::path& file) {
   relighter_.emplace(std::move(relighter));
   next_start_ = FrameStart::exact;
   exposure_.reset();
+  colours_.reset();
+  clusters_.pixels.clear();
   recording_now_ = false;
 }
 
@@ -301,10 +304,11 @@ bool Session::advance(const ViewSettings& settings, double ticks, ViewFrame& out
         {light_, settings.method, lighting.wavelets, settings.weight, next_start_, camera});
   }
   if (!exposure_) {
-    exposure_ = auto_exposure_ev(
-        next_start_ == FrameStart::exact
-            ? relighter_->picture()
-            : relight_picture_once(scene_->transport, target, relighter_->view().camera));
+    exposure_ =
+        auto_exposure_ev(next_start_ == FrameStart::exact
+                             ? relighter_->picture()
+                             : relight_picture_once(scene_->transport, target,
+                                                    relighter_->view().camera, any_relighter()));
   }
   allowed_ = lighting.wavelets;
   next_start_ = FrameStart::advance;
@@ -325,6 +329,8 @@ void Session::fill(const ViewSettings& settings, ViewFrame& out) {
   out.light = light_;
   out.exact_exposure_ev = *exposure_;
   out.picture = relighter_->picture();
+  draw_clusters(settings);
+  if (!clusters_.pixels.empty()) out.picture = clusters_;
   out.compared = relighter_->reference() != nullptr;
   if (out.compared) out.reference = *relighter_->reference();
   const SceneView view = relighter_->view();
@@ -349,6 +355,16 @@ void Session::fill(const ViewSettings& settings, ViewFrame& out) {
   if (settings.show_lighting) fill_lighting(out);
 }
 
+// In colours that the display's exposure leaves as they are.
+void Session::draw_clusters(const ViewSettings& settings) {
+  clusters_.pixels.clear();
+  if (!settings.clusters || scene_->transport.kind() != TransportKind::clusters) return;
+  if (!colours_) colours_.emplace(scene_->transport);
+  clusters_ = colours_->picture(relighter_->view().camera);
+  const auto bright = static_cast<float>(std::exp2(-*exposure_));
+  for (Rgb& pixel : clusters_.pixels) pixel *= bright;
+}
+
 void Session::fill_lighting(ViewFrame& out) {
   const HaarLayout& layout = relighter_->tracker().layout();
   out.target = rig_->cubemap(light_);
@@ -358,7 +374,7 @@ void Session::fill_lighting(ViewFrame& out) {
 }
 
 Image Session::picture_with_background() const {
-  Image picture = relighter_->picture();
+  Image picture = clusters_.pixels.empty() ? relighter_->picture() : clusters_;
   std::vector<Environment> environments;
   for (const auto& light : lights_) environments.push_back(light->environment);
   composite_light_background(relighter_->view(), light_, environments, picture);

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "cpca/cluster_colours.h"
 #include "prt/frame_relighter.h"
 #include "prt/light_rig.h"
 #include "prt/motion_file.h"
@@ -58,11 +59,14 @@ class Session {
   void move_on(const ViewSettings& settings, double ticks);
   void fill(const ViewSettings& settings, ViewFrame& out);
   void fill_lighting(ViewFrame& out);
+  void draw_clusters(const ViewSettings& settings);
 
   std::shared_ptr<const OpenScene> scene_;
   std::vector<std::shared_ptr<const OpenLight>> lights_;  // as the rig numbers them
   std::optional<LightRig> rig_;
   std::optional<FrameRelighter> relighter_;
+  std::optional<ClusterColours> colours_;  // once asked for
+  Image clusters_;                         // the last frame in them, if it was asked for
   std::optional<double> exposure_;
   BoundingSphere middle_;  // of a mesh
   std::uint64_t view_number_ = 0;

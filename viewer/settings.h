@@ -47,6 +47,7 @@ struct ViewSettings {
   int width = 0, height = 0;  ///< pixels; 0: the file's
 
   bool compare = false;        ///< relight exactly too
+  bool clusters = false;       ///< show a compressed transport's clusters in colours instead
   bool show_lighting = false;  ///< fill ViewFrame::target, shown and touched
 
   bool operator==(const ViewSettings&) const = default;

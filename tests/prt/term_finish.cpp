@@ -236,57 +236,5 @@ TEST(ViewFactors, PacksAndRefuses) {
                Error);
 }
 
-TEST(ClusterWeights, PacksAndRefuses) {
-  ClusterWeights right;
-  right.clusters = 4, right.basis = 3;
-  for (std::uint32_t v = 0; v < 50; ++v) {
-    right.cluster.push_back(v % 4);
-    for (int s = 0; s < 3; ++s) right.weight.push_back(0.25f * static_cast<float>(s) - 0.1f);
-  }
-  const std::vector<std::byte> packed = pack_cluster_weights(right);
-  EXPECT_EQ(unpack_cluster_weights(packed, 50, "a"), right);
-  EXPECT_THROW(unpack_cluster_weights(packed, 51, "a"), Error);
-  for (std::size_t size = 0; size < packed.size(); ++size) {
-    EXPECT_THROW(unpack_cluster_weights(std::span(packed).first(size), 50, "a"), Error) << size;
-  }
-  ClusterWeights bad = right;
-  bad.cluster[3] = 4;
-  EXPECT_NE(check_cluster_weights(bad, 50), "");
-  bad = right;
-  bad.weight[3] = std::numeric_limits<float>::infinity();
-  EXPECT_NE(check_cluster_weights(bad, 50), "");
-  bad = right;
-  bad.basis = 0;
-  EXPECT_NE(check_cluster_weights(bad, 50), "");
-}
-
-TEST(ClusterWeights, FilesKeepThem) {
-  const TemporaryFolder folder;
-  SmallTransport small = transport_with_factors(100, 2, 17);
-  ClusterWeights weights;
-  weights.clusters = 5, weights.basis = 2;
-  for (std::uint32_t v = 0; v < small.info.mesh->position.size(); ++v) {
-    weights.cluster.push_back(v % 5);
-    weights.weight.push_back(1), weights.weight.push_back(-0.5f);
-  }
-  small.info.kind = TransportKind::clusters;
-  EXPECT_THROW(TransportWriter(folder / "a.hlt", small.info, {small.thresholds, "test", false}),
-               Error);
-  small.info.clusters = std::make_shared<const ClusterWeights>(weights);
-  EXPECT_EQ(small.info.output_count(), 20u);
-  TransportWriter writer(folder / "a.hlt", small.info, {small.thresholds, "test", false});
-  ASSERT_EQ(writer.tile_count(), 1);
-  writer.write_tile(0, small.tiles[0]);
-  writer.finish("{}");
-  const Transport file = Transport::open(folder / "a.hlt");
-  EXPECT_EQ(file.kind(), TransportKind::clusters);
-  ASSERT_NE(file.info().clusters, nullptr);
-  EXPECT_EQ(*file.info().clusters, weights);
-  EXPECT_EQ(*file.info().view, *small.info.view);
-  for (std::uint32_t o = 0; o < 20; ++o) EXPECT_EQ(file.row_output()[o], o);
-  EXPECT_EQ(file.row_output()[20], kNoOutput);
-  EXPECT_THROW(PictureRelighter{file}, Error);
-}
-
 }  // namespace
 }  // namespace haarlight
