@@ -36,9 +36,9 @@ HAARLIGHT_LANES float sum_of(Eight v) {
 HAARLIGHT_LANES unsigned mask_of(EightInts compared) {
   constexpr EightInts kBit{1, 2, 4, 8, 16, 32, 64, 128};
   EightInts bits = compared & kBit;
-  bits |= __builtin_shuffle(bits, EightInts{4, 5, 6, 7, 0, 1, 2, 3});
-  bits |= __builtin_shuffle(bits, EightInts{2, 3, 0, 1, 6, 7, 4, 5});
-  bits |= __builtin_shuffle(bits, EightInts{1, 0, 3, 2, 5, 4, 7, 6});
+  bits |= __builtin_shufflevector(bits, bits, 4, 5, 6, 7, 0, 1, 2, 3);
+  bits |= __builtin_shufflevector(bits, bits, 2, 3, 0, 1, 6, 7, 4, 5);
+  bits |= __builtin_shufflevector(bits, bits, 1, 0, 3, 2, 5, 4, 7, 6);
   return static_cast<unsigned>(bits[0]);
 }
 /// The way back: all ones where bit i is set.

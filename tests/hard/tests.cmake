@@ -22,7 +22,7 @@ haarlight_hard_test(long SOURCES long_run USES haarlight_prt)
 haarlight_hard_test(geometry SOURCES geometry_lobes geometry_rays USES haarlight_precompute)
 haarlight_hard_test(determinism SOURCES determinism USES haarlight_precompute XxHash::XxHash)
 
-haarlight_hard_test(files SOURCES files_damage USES haarlight_fuzz_targets XxHash::XxHash)
+haarlight_hard_test(files SOURCES files_damage files_models USES haarlight_fuzz_targets XxHash::XxHash)
 
 # A library preloaded into the programs under test, which makes their writes fail; and a program that
 # writes what haarlight writes beside transports and pictures.
