@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -113,6 +114,12 @@ Json describe(const std::filesystem::path& file, const Transport& transport) {
     out["vertices"] = info.mesh->position.size();
     out["triangles"] = info.mesh->triangle.size();
     out["terms"] = info.terms;
+    if (info.view) {
+      int most = 0;
+      for (const int order : info.view->order) most = std::max(most, std::abs(order));
+      out["view_factors"] = {
+          {"sets", info.view->sets()}, {"samples", info.view->resolution}, {"most_order", most}};
+    }
   }
   if (info.clusters) out["clusters"] = describe_clusters(info);
   out["face_size"] = info.face_size;
@@ -179,6 +186,21 @@ void print_text(const Json& d) {
                              d["vertices"].get<std::int64_t>(), d["triangles"].get<std::int64_t>(),
                              d["terms"].get<int>(), d["terms"] == 1 ? "" : "s",
                              d["width"].get<int>(), d["height"].get<int>()));
+    if (d.contains("view_factors")) {
+      const Json& view = d["view_factors"];
+      line("view factors",
+           fmt::format("{} set{} of {} terms, {} samples each, orders up to {}",
+                       view["sets"].get<int>(), view["sets"] == 1 ? "" : "s", d["terms"].get<int>(),
+                       view["samples"].get<int>(), view["most_order"].get<int>()));
+    }
+    if (d["made"].contains("terms") && d["made"]["terms"].is_object()) {
+      for (const Json& m : d["made"]["terms"].value("materials", Json::array())) {
+        if (!m.is_object()) continue;
+        line("  " + m.value("name", std::string("?")),
+             fmt::format("{} term{}; {:.2g} of the BRDF is left out", m.value("terms", 0),
+                         m.value("terms", 0) == 1 ? "" : "s", m.value("error", 0.0)));
+      }
+    }
   } else {
     line("picture", fmt::format("{}x{} pixels, {} of them show the scene", d["width"].get<int>(),
                                 d["height"].get<int>(), d["pixels_covered"].get<std::int64_t>()));
@@ -235,7 +257,7 @@ void print_text(const Json& d) {
   line("checksums", "verified, every byte");
   print_effects(d["made"]);
   for (const auto& [key, value] : d["made"].items()) {
-    if (key == "measured_error" || key == "effects" || key == "plan") continue;
+    if (key == "measured_error" || key == "effects" || key == "plan" || key == "terms") continue;
     if (key == "compressed" && value.is_object() && value.contains("source")) {
       print_source(value["source"]);
     }

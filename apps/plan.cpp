@@ -48,6 +48,7 @@ void PlanCommand::run() {
   PlanOptions planning;
   planning.trace = options.trace;
   planning.error = options.error;
+  planning.terms = options.terms;
   const Plan plan = scene.vertices ? plan_mesh(staged.scene, planning)
                                    : plan_image(staged.scene, staged.stage.camera, planning);
   print_notes(scene.scene, plan.notes);

@@ -105,6 +105,7 @@ void PrecomputeCommand::choose_effects(const StagedScene& staged, bool speaks) {
     planning.trace = options.trace;
     planning.error = options.error;
     planning.costs = false;
+    planning.terms = options.terms;
     const Plan plan = scene.vertices ? plan_mesh(staged.scene, planning)
                                      : plan_image(staged.scene, staged.stage.camera, planning);
     options.trace.effects = plan.effects;
@@ -127,7 +128,13 @@ void PrecomputeCommand::print_mesh(const MeshReport& report) const {
                report.subdivision_seconds);
   }
   fmt::print("\n");
-  if (report.view_dependent > 0) {
+  if (report.view_dependent == 0) return;
+  if (report.terms > 1) {
+    fmt::print(
+        "{} terms a vertex; what they leave is largest of material \"{}\": {:.2g} of its "
+        "BRDF\n",
+        report.terms, report.terms_material, report.terms_error);
+  } else if (!options.trace.effects.gloss) {
     fmt::print("{} vertices are glossy, mirrors or glass: their diffuse part alone is kept\n",
                report.view_dependent);
   }
@@ -152,6 +159,7 @@ Verb add_precompute(CLI::App& verb) {
       "Examples:\n"
       "  haarlight precompute bunny.obj -o bunny.hlt\n"
       "  haarlight precompute bunny.obj -o mesh.hlt --vertices --face 32\n"
+      "  haarlight precompute street.glb -o street.hlt --vertices --terms 4\n"
       "  haarlight precompute room.glb -o room.hlt --size 1280x720 --error 0.005\n"
       "  haarlight precompute room.glb -o room.hlt --size 1280x720 --error 0.005 --resume\n"
       "  haarlight precompute room.glb -o room.hlt --time-limit 600 --max-bytes 200M");

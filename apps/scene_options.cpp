@@ -4,13 +4,16 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <string>
 #include <tuple>
 
 #include "apps/option_parsers.h"
 #include "apps/repairs.h"
 #include "core/error.h"
+#include "precompute/brdf_factors.h"
 #include "precompute/effects.h"
+#include "precompute/material_import.h"
 #include "precompute/scene_import.h"
 
 namespace haarlight {
@@ -95,11 +98,72 @@ void add_scene_options(CLI::App& verb, SceneOptions& scene, MeshOptions& options
                    "auto: split triangles where visibility changes by more than --error")
       ->needs(per_vertex)
       ->group("Mesh");
+  verb.add_option_function<std::string>(
+          "--terms",
+          [&options](const std::string& text) {
+            if (text == "auto") {
+              options.terms.terms = 0;
+              return;
+            }
+            const double terms = parse_number("--terms", text, 1, kMostBrdfTerms);
+            if (terms != std::floor(terms)) {
+              refuse_option("--terms", text,
+                            fmt::format("auto or a whole number, 1 to {}", kMostBrdfTerms));
+            }
+            options.terms.terms = static_cast<int>(terms);
+          },
+          fmt::format(
+              "of the BRDF of each vertex, 1 to {}, where gloss is among the effects: a "
+              "highlight is seen as sharp as they allow. auto: as many as --terms-error asks "
+              "for, at most {} [auto]",
+              kMostBrdfTerms, options.terms.most))
+      ->type_name("auto|K")
+      ->needs(per_vertex)
+      ->group("Mesh");
+  add_number(verb, "--terms-error", options.terms.error, 0.001, 0.99,
+             "relative RMS that --terms auto may leave of a BRDF, over both hemispheres")
+      ->needs(per_vertex)
+      ->group("Mesh");
+  verb.add_option_function<std::vector<std::string>>(
+          "--merl", [&scene](const std::vector<std::string>& all) { scene.merl = all; },
+          "the material of that name is the measured BRDF in FILE.binary, in MERL's form (90 x 90 "
+          "x "
+          "180 cells or others); may be given for several")
+      ->type_name("MATERIAL=FILE.binary")
+      ->allow_extra_args(false)
+      ->needs(per_vertex)
+      ->group("Mesh");
   add_integer(verb, "--max-vertices", options.max_vertices, 1, 100'000'000,
               "that subdivision may lead to")
       ->needs(per_vertex)
       ->group("Mesh");
 }
+
+namespace {
+
+// "MATERIAL=FILE".
+void set_merl(const std::string& pair, const std::filesystem::path& file, Scene& scene) {
+  const std::size_t at = pair.rfind('=');
+  if (at == std::string::npos || at == 0 || at + 1 == pair.size()) {
+    throw Error(ErrorKind::invalid_argument,
+                fmt::format("--merl is \"{}\", expected MATERIAL=FILE.binary", pair));
+  }
+  const std::string name = pair.substr(0, at);
+  bool found = false;
+  std::string names;
+  for (Material& material : scene.material) {
+    names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", material.name);
+    if (material.name != name) continue;
+    set_measured(material, pair.substr(at + 1));
+    found = true;
+  }
+  if (!found) {
+    throw Error(ErrorKind::missing, fmt::format("{}: has no material \"{}\", expected one of {}",
+                                                file.string(), name, names));
+  }
+}
+
+}  // namespace
 
 StagedScene load_scene(SceneOptions& options, bool say_repairs) {
   StagedScene staged{import_scene(options.scene), {}};
@@ -109,6 +173,7 @@ StagedScene load_scene(SceneOptions& options, bool say_repairs) {
                 fmt::format("{}: has no perspective camera, expected one for --view scene",
                             options.scene.string()));
   }
+  for (const std::string& pair : options.merl) set_merl(pair, options.scene, staged.scene);
   options.stage.use_scene_camera = options.view != SceneOptions::View::framing;
   staged.stage = set_stage(staged.scene, options.stage);
   return staged;

@@ -4,6 +4,8 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "precompute/default_stage.h"
 #include "precompute/precompute_mesh.h"
@@ -18,8 +20,9 @@ struct SceneOptions {
   View view = View::automatic;
   StageOptions stage;
   bool vertices = false;
-  bool auto_effects = true;  ///< by the plan; else trace.effects
-  int bounces = -1;          ///< that override effects'; -1: they are left
+  bool auto_effects = true;       ///< by the plan; else trace.effects
+  std::vector<std::string> merl;  ///< MATERIAL=FILE.binary each
+  int bounces = -1;               ///< that override effects'; -1: they are left
 };
 
 /// SCENE, and the options of groups Stage, Light, Accuracy and Mesh.

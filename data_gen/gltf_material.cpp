@@ -38,7 +38,13 @@ std::size_t GltfTextures::index(int texture, bool srgb) {
   return number;
 }
 
-json gltf_material(const Material& material, GltfTextures& textures,
+bool wants_phong(const Scene& scene) {
+  return std::any_of(scene.material.begin(), scene.material.end(), [](const Material& m) {
+    return m.model == SurfaceModel::phong && luminance(m.specular) >= 0.1f;
+  });
+}
+
+json gltf_material(const Material& material, bool phong, GltfTextures& textures,
                    std::vector<std::string>& extensions) {
   Rgb base = material.albedo;
   double metallic = static_cast<double>(material.metallic);
@@ -53,6 +59,9 @@ json gltf_material(const Material& material, GltfTextures& textures,
       roughness = lobe ? std::pow(2.0 / (static_cast<double>(material.exponent) + 2.0), 0.25) : 1.0;
       break;
     }
+    case SurfaceModel::measured:  // the file that it is in is not the scene's
+      roughness = 1;
+      break;
     case SurfaceModel::metallic_roughness:
       transmission = static_cast<double>(material.transmission);
       break;
@@ -75,6 +84,12 @@ json gltf_material(const Material& material, GltfTextures& textures,
         {"index", textures.index(material.metallic_roughness_texture, false)}};
   }
   json out{{"name", material.name}, {"pbrMetallicRoughness", pbr}};
+  if (phong && material.model == SurfaceModel::phong) {
+    const auto color = [](const Rgb& c) { return json::array({c.r, c.g, c.b}); };
+    out["extras"]["haarlight"]["phong"] = {{"diffuse", color(material.albedo)},
+                                           {"specular", color(material.specular)},
+                                           {"exponent", material.exponent}};
+  }
   if (material.normal_texture >= 0) {
     out["normalTexture"] = {{"index", textures.index(material.normal_texture, false)},
                             {"scale", material.normal_scale}};

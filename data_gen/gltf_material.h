@@ -24,9 +24,14 @@ class GltfTextures {
   std::vector<std::pair<int, bool>> wanted_;
 };
 
-/// The JSON object of a material. The names of the extensions that it uses are added to
-/// `extensions`, each once.
-nlohmann::json gltf_material(const Material& material, GltfTextures& textures,
+/// Whether Phong materials are also written as such, into "extras" (precompute/gltf_materials.h):
+/// if any of the scene has a lobe of a tenth or more, which glTF cannot say. Else they come back as
+/// rough dielectrics.
+bool wants_phong(const Scene& scene);
+
+/// The JSON object of a material. `phong`: see wants_phong(). The names of the extensions that it
+/// uses are added to `extensions`, each once.
+nlohmann::json gltf_material(const Material& material, bool phong, GltfTextures& textures,
                              std::vector<std::string>& extensions);
 
 }  // namespace haarlight::data_gen

@@ -17,6 +17,7 @@
 #include "core/float_check.h"
 #include "core/image_io.h"
 #include "data_gen/environments.h"
+#include "data_gen/merl.h"
 #include "data_gen/mesh_writer.h"
 #include "data_gen/scenes.h"
 
@@ -131,6 +132,14 @@ int run(int argc, char** argv) {
   environment->add_option("--seed", seed, "Another seed gives another light of the kind")
       ->capture_default_str();
 
+  CLI::App* brdf = app.add_subcommand(
+      "brdf", "Write the BRDF of a red lacquer as a table in the binary form of the MERL database");
+  brdf->add_option("-o,--output", file, "FILE.binary")->required();
+  double exponent = Lacquer().exponent;
+  brdf->add_option("--exponent", exponent, "Of its highlight, 1 to 10000")
+      ->check(CLI::Range(1.0, 1e4))
+      ->capture_default_str();
+
   CLI::App* listing = app.add_subcommand("list", "List scenes and environments");
 
   try {
@@ -140,6 +149,12 @@ int run(int argc, char** argv) {
   }
   if (*scene) write_scene(name, seed, file);
   if (*environment) write_environment(name, seed, layout, size, file);
+  if (*brdf) {
+    Lacquer lacquer;
+    lacquer.exponent = exponent;
+    write_merl(file, lacquer);
+    fmt::print("{}: 90 x 90 x 180 cells\n", file.string());
+  }
   if (*listing) list();
   return 0;
 }

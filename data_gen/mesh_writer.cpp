@@ -108,8 +108,9 @@ void write_glb(const std::filesystem::path& file, const Scene& scene) {
        accessors = json::array();
   GltfTextures textures;
   std::vector<std::string> extensions;
+  const bool phong = wants_phong(scene);
   for (const Material& material : scene.material) {
-    materials.push_back(gltf_material(material, textures, extensions));
+    materials.push_back(gltf_material(material, phong, textures, extensions));
   }
 
   GltfBuffer buffer;
@@ -240,6 +241,8 @@ std::string obj_material(const Material& m, const std::string& name) {
       if (lobe) mtl += fmt::format("Ns {}\n", m.exponent);
       return mtl + (lobe ? "illum 2\n\n" : "illum 1\n\n");
     }
+    case SurfaceModel::measured:
+      return mtl + color("Kd", m.albedo) + "illum 1\n\n";
     case SurfaceModel::metallic_roughness:
       return mtl + color("Kd", m.albedo) +
              fmt::format("Pm {}\nPr {}\nNi {}\nillum 2\n\n", m.metallic, m.roughness, m.ior);

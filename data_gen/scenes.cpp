@@ -22,6 +22,7 @@ constexpr std::array kScenes{
     SceneEntry{"cornell-dark", "the same with black walls: nothing bounces", make_cornell_dark},
     SceneEntry{"metals", "balls of gold, copper and plastic, smooth to rough", make_metals},
     SceneEntry{"room", "a furnished room, lit through its window only", make_room},
+    SceneEntry{"street", "a street with shiny lamps, 40,000 vertices", make_street},
     SceneEntry{"convex", "one convex body in the open: nothing but its own horizon", make_convex},
 };
 

@@ -45,6 +45,9 @@ Scene make_cornell_dark(std::uint64_t seed);
 Scene make_metals(std::uint64_t seed);
 /// A closed room of 5 x 2.7 x 4 m with one window; table, sofa, shelf, rug and a screen with holes.
 Scene make_room(std::uint64_t seed);
+/// A street with shiny lamps and bollards before a house front, 40,000 vertices, most of them on
+/// the ground. After Overbeck et al. 2006, Figures 11 and 12.
+Scene make_street(std::uint64_t seed);
 /// One clay ellipsoid in the air.
 Scene make_convex(std::uint64_t seed);
 

@@ -7,6 +7,8 @@
 
 #include "precompute/fresnel.h"
 #include "precompute/ggx.h"
+#include "precompute/incoming_term.h"
+#include "precompute/measured_brdf.h"
 #include "precompute/surface.h"
 
 namespace haarlight {
@@ -117,6 +119,7 @@ RgbD Bsdf::diffuse_out(const Vec3& o) const {
 }
 
 double Bsdf::diffuse_in(const Vec3& w) const {
+  if (term) return term->value(Frame(normal).to_local(w));
   const double cosine = dot(normal, w);
   if (!(cosine > 0)) return 0;
   if (coat_f0 == 0) return cosine / kPi;
@@ -202,6 +205,7 @@ double Bsdf::lobe_half_width() const {
 bool has_single_directions(const Material& material) {
   switch (material.model) {
     case SurfaceModel::phong:
+    case SurfaceModel::measured:
       return false;
     case SurfaceModel::metallic_roughness:
       return material.transmission > 0 || material.roughness < kMirrorRoughness;
@@ -231,6 +235,11 @@ Bsdf bsdf_at(const Scene& scene, const SurfaceHit& hit) {
       break;
     case SurfaceModel::glass:
       add_glass(b, material, hit.outside, albedo);
+      break;
+    case SurfaceModel::measured:
+      b.diffuse_reflectance = albedo;
+      if (material.measured)
+        b.diffuse_reflectance = b.diffuse_reflectance * material.measured->albedo;
       break;
   }
   return b;

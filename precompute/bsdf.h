@@ -20,6 +20,7 @@
 namespace haarlight {
 
 struct SurfaceHit;
+struct IncomingTerm;  // precompute/incoming_term.h
 
 /// A point's BSDF. w is the direction light comes from, o the direction it leaves to (to_viewer);
 /// both unit and away from the surface. Everything is 0 for w below the shading normal's horizon,
@@ -47,6 +48,8 @@ struct Bsdf {
   Vec3 normal;            ///< shading normal, unit, on the side of geometric_normal
   Vec3 to_viewer;         ///< unit
 
+  /// Of a term of a factored BRDF: stands for the diffuse part's incoming factor. Else null.
+  const IncomingTerm* term = nullptr;
   // Diffuse.
   RgbD diffuse_reflectance;  ///< (1 - metallic) base colour, or the albedo; 0: none
   double coat_f0 = 0;        ///< the coat's at normal incidence; 0: plain Lambert
@@ -75,7 +78,7 @@ struct Bsdf {
 
   /// Outgoing factor of the diffuse part towards `o` (unit): reflectance, times the coat's if any.
   RgbD diffuse_out(const Vec3& o) const;
-  /// Incoming factor, cosine and 1/pi included: max(0, n.w) / pi for Lambert.
+  /// Incoming factor, cosine and 1/pi included: max(0, n.w) / pi for Lambert, f_k for a term.
   double diffuse_in(const Vec3& w) const;
 
   /// Both scalars of the lobe for light from `w` leaving towards `o` (cosine n.w included). Finite

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/simd.h"
+#include "precompute/incoming_term.h"
 #include "precompute/lanes.h"
 
 namespace haarlight {
@@ -83,14 +84,17 @@ void Connections::begin(const TileReceivers& tile) {
   }
   coat_.assign(padded_, CoatTables::kNone);
   row_.resize(count_);
-  coats_.clear(), lobes_.clear(), chances_.clear();
+  coats_.clear(), lobes_.clear(), chances_.clear(), terms_.clear();
   if (place_coats_.size() > kMostPlaceCoats) place_coats_.clear();
   for (std::size_t i = 0; i < count_; ++i) {
     const Receiver& r = tile.receivers[i];
     const Bsdf& b = r.bsdf;
     const bool wide = shares_lobe(b);
     const RgbD albedo = b.diffuse_albedo() + (wide ? b.lobe_albedo() : RgbD{});
-    chances_.add(luminance(r.weight * albedo));
+    // Terms may be negative, and small ones are worth few paths.
+    const double worth = b.term ? b.term->importance : 1;
+    if (b.term) terms_.push_back(i);
+    chances_.add(worth * luminance(r.weight * albedo));
     const Vec3 at = r.position + Visibility::kSurfaceOffset * b.geometric_normal;
     o.x[i] = to_float(at.x), o.y[i] = to_float(at.y), o.z[i] = to_float(at.z);
     o.nx[i] = to_float(b.normal.x), o.ny[i] = to_float(b.normal.y);
@@ -172,6 +176,14 @@ void Connections::find_onwards() {
     for (std::size_t i = 0; i < padded_; ++i) {
       to[i] += first[i] * lobe_first_[i] + second[i] * lobe_second_[i];
     }
+  }
+  for (const std::size_t i : terms_) {
+    if (!(geometry_[i] > 0)) continue;
+    const Vec3 w{static_cast<double>(wx_[i]), static_cast<double>(wy_[i]),
+                 static_cast<double>(wz_[i])};
+    const double f = tile_->receivers[i].bsdf.diffuse_in(w) * kPi;
+    const float over = to_float(f) / cosine_[i];
+    for (auto& channel_onwards : onwards_) channel_onwards[i] *= over;
   }
 }
 

@@ -67,6 +67,7 @@ class Connections {
   } of_;
   std::vector<std::int32_t> coat_;
   std::vector<std::size_t> row_;
+  std::vector<std::size_t> terms_;  // receivers that stand for a term of a BRDF
   CoatTables coats_;
   LobeLanes lobes_;
 

@@ -2,6 +2,8 @@
 
 #include "precompute/fingerprint.h"
 
+#include "precompute/measured_brdf.h"
+
 namespace haarlight {
 namespace {
 
@@ -11,6 +13,11 @@ void add_material(ContentHash& hash, const Material& m) {
   hash.add(m.metallic), hash.add(m.roughness), hash.add(m.metallic_roughness_texture);
   hash.add(m.transmission);
   hash.add(m.ior), hash.add(m.extinction), hash.add(m.thin);
+  hash.add(m.measured != nullptr);
+  if (m.measured) {
+    hash.add(m.measured->half_cells), hash.add(m.measured->difference_cells);
+    hash.add_all(m.measured->value);
+  }
   hash.add(m.normal_texture), hash.add(m.normal_scale), hash.add(m.alpha_cutoff);
 }
 

@@ -54,8 +54,29 @@ void read_volume(const json& volume, GltfMaterial& out) {
   out.extinction = {extinction(color.r), extinction(color.g), extinction(color.b)};
 }
 
+void read_own(const json& own, GltfMaterial& out) {
+  if (!own.is_object()) return;
+  if (own.contains("phong") && own.at("phong").is_object()) {
+    const json& phong = own.at("phong");
+    const auto color = [&](const char* key) {
+      return phong.contains(key) ? unit_rgb(phong, key) : Rgb{};
+    };
+    out.phong = true;
+    out.diffuse = color("diffuse");
+    out.specular = color("specular");
+    out.exponent = static_cast<float>(std::clamp(number(phong, "exponent", 32), 0.0, 1e4));
+  }
+  if (own.contains("measured") && own.at("measured").is_string()) {
+    out.measured = own.at("measured").get<std::string>();
+  }
+}
+
 GltfMaterial read_material(const json& material) {
   GltfMaterial out;
+  if (material.contains("extras") && material.at("extras").is_object() &&
+      material.at("extras").contains("haarlight")) {
+    read_own(material.at("extras").at("haarlight"), out);
+  }
   if (material.contains("pbrMetallicRoughness")) {
     read_surface(material.at("pbrMetallicRoughness"), out);
   }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <string>
 #include <vector>
 
 #include "core/rgb.h"
@@ -24,6 +25,13 @@ struct GltfMaterial {
   float transmission = 0;
   bool has_inside = false;  ///< a volume of some thickness
   Rgb extinction{};         ///< 1/m, of the volume
+  /// The project's own, in "extras": {"haarlight": {"phong": {"diffuse": [r, g, b], "specular":
+  /// [r, g, b], "exponent": e}}} or {"haarlight": {"measured": "FILE.binary"}}, a table in MERL's
+  /// form, named from the file's folder. Other programs see the rest of the material.
+  bool phong = false;
+  Rgb diffuse{}, specular{};
+  float exponent = 32;
+  std::string measured;
 };
 
 /// The file's materials in order. Throws nlohmann::json exceptions where the file's structure is

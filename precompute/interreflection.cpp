@@ -21,7 +21,7 @@ enum Part : unsigned { kDiffuse = 1, kLobe = 2, kDelta = 4, kAllParts = 7 };
 
 // 1 where the coat, if any, lets all through: diffuse_in is (n.w) / pi times this.
 double coat_in(const Bsdf& b, const Vec3& w) {
-  if (!(b.coat_f0 > 0)) return 1;
+  if (!(b.coat_f0 > 0) && !b.term) return 1;
   const double cosine = dot(b.normal, w);
   return cosine > 0 ? b.diffuse_in(w) * kPi / cosine : 0;
 }

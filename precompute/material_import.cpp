@@ -12,6 +12,7 @@
 #include <string>
 
 #include "precompute/bsdf.h"
+#include "precompute/measured_brdf.h"
 
 namespace haarlight {
 namespace {
@@ -96,7 +97,7 @@ Rgb color(const aiMaterial& in, const char* key, unsigned type, unsigned number_
 }  // namespace
 
 Material import_gltf_material(const GltfMaterial& numbers, const aiMaterial& in,
-                              TextureImport& textures, SceneReport& report) {
+                              TextureImport& textures, const Scene& scene, SceneReport& report) {
   Material out;
   out.model = SurfaceModel::metallic_roughness;
   out.albedo = numbers.base;
@@ -124,8 +125,25 @@ Material import_gltf_material(const GltfMaterial& numbers, const aiMaterial& in,
     out.metallic_roughness_texture =
         textures.index(texture_path(in, aiTextureType_UNKNOWN), ImageEncoding::data);
   }
+  if (numbers.phong) {
+    out.model = SurfaceModel::phong;
+    out.albedo = numbers.diffuse;
+    out.specular = numbers.specular, out.exponent = numbers.exponent;
+    out.transmission = 0;
+    out.metallic_roughness_texture = -1;
+    limit_energy(out, scene, report);
+  }
   apply_alpha(out, numbers, textures, report);
   return out;
+}
+
+void set_measured(Material& material, const std::filesystem::path& file) {
+  Material out;
+  out.name = material.name;
+  out.model = SurfaceModel::measured;
+  out.albedo = {1, 1, 1};
+  out.measured = std::make_shared<const MeasuredBrdf>(read_merl(file));
+  material = out;
 }
 
 Material import_obj_material(const aiMaterial& in, TextureImport& textures, const Scene& scene,

@@ -15,6 +15,9 @@ class MeshWorker : public TileSource::Worker {
 
   void trace(std::span<const std::uint32_t> outputs, TileRows& rows) override {
     sampler_.sample(outputs, receivers_);
+    if (!tracer_.options().effects.gloss) {
+      std::erase_if(receivers_.receivers, [](const Receiver& r) { return r.bsdf.term != nullptr; });
+    }
     TileNoise here;
     tracer_.trace(receivers_, scratch_, rows, counts, &here);
     rows.noise_variance = here.variance;

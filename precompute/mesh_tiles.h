@@ -12,7 +12,8 @@
 
 namespace haarlight {
 
-/// Outputs are the vertices of `sampler`; `scene` is the one that `visibility` was made from. Keeps
+/// Outputs are the vertices of `sampler`, or their terms; without effect gloss rows of terms that
+/// are not a diffuse part are empty; `scene` is the one that `visibility` was made from. Keeps
 /// references to all three.
 class MeshTiles : public TileSource {
  public:

@@ -11,7 +11,7 @@
 #include <optional>
 
 #include "core/parallel.h"
-#include "precompute/brdf_terms.h"
+#include "precompute/brdf_factors.h"
 #include "precompute/bsdf.h"
 #include "precompute/pilots.h"
 #include "precompute/probe.h"
@@ -129,7 +129,9 @@ Plan make_plan(const Scene& scene, const SourceMaker& source, std::span<const st
   Effects possible = all_effects();
   possible.shadows = !lone_convex;
   possible.bounces = lone_convex || !facts.reflects ? 0 : kMostBounces;
-  possible.gloss = facts.glossy_area > 0;
+  // Seen from anywhere, mirrors are narrow lobes.
+  const bool blurred = options.vertices && options.terms_per_vertex > 1;
+  possible.gloss = facts.glossy_area > 0 || blurred;
   possible.specular = facts.specular_area > 0;
   possible.caustics = facts.specular_area > 0 && !lone_convex;
   possible.color = facts.colored;
@@ -233,10 +235,14 @@ Plan make_plan(const Scene& scene, const SourceMaker& source, std::span<const st
                         : brdf_terms(scene.material[static_cast<std::size_t>(facts.glossiest)],
                                      std::max(options.error, 1e-3));
   judge("gloss", &Effects::gloss, possible.gloss,
-        fmt::format("{} of the surface; seen from all sides the narrowest lobe is worth {}",
-                    percent(facts.glossy_area),
-                    terms > kMostBrdfTerms ? fmt::format("more than K = {} terms", kMostBrdfTerms)
-                                           : fmt::format("K = {} terms", terms)),
+        facts.glossy_area == 0
+            ? fmt::format("{} of the surface are mirrors, blurred lobes at vertices",
+                          percent(facts.specular_area))
+            : fmt::format("{} of the surface; seen from all sides the narrowest lobe is worth {}",
+                          percent(facts.glossy_area),
+                          terms > kMostBrdfTerms
+                              ? fmt::format("more than K = {} terms", kMostBrdfTerms)
+                              : fmt::format("K = {} terms", terms)),
         "no material has a lobe");
   judge("specular", &Effects::specular, possible.specular,
         fmt::format("mirrors and glass are {} of the surface", percent(facts.specular_area)),
@@ -251,10 +257,12 @@ Plan make_plan(const Scene& scene, const SourceMaker& source, std::span<const st
     }
     const bool varies = facts.glossy_area + facts.specular_area > 0;
     add("view dependence", options.vertices && varies,
-        !varies            ? "all materials are diffuse"
-        : options.vertices ? fmt::format("{} of the surface looks different from each side",
-                                         percent(facts.glossy_area + facts.specular_area))
-                           : "the view is fixed: it is in the rows",
+        !varies ? "all materials are diffuse"
+        : options.vertices
+            ? fmt::format("{} of the surface looks different from each side: {} term{} a vertex",
+                          percent(facts.glossy_area + facts.specular_area),
+                          options.terms_per_vertex, options.terms_per_vertex == 1 ? "" : "s")
+            : "the view is fixed: it is in the rows",
         options.vertices ? error : 0);
   }
 
@@ -293,6 +301,7 @@ Plan make_plan(const Scene& scene, const SourceMaker& source, std::span<const st
     if (row.effect == "interreflection") row.needed = plan.effects.bounces > 0;
     if (row.effect == "color") row.needed = plan.effects.color;
     if (row.effect == "gloss") row.needed = plan.effects.gloss;
+    if (row.effect == "view dependence" && options.vertices) row.needed = plan.effects.gloss;
     if (row.effect == "specular") row.needed = plan.effects.specular;
     if (row.effect == "caustics") row.needed = plan.effects.caustics;
   }

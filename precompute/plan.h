@@ -13,6 +13,7 @@
 #include "precompute/scene.h"
 #include "precompute/tile_source.h"
 #include "precompute/tile_tracer.h"
+#include "precompute/vertex_terms.h"
 #include "precompute/visibility.h"
 
 namespace haarlight {
@@ -43,10 +44,12 @@ struct Plan {
 };
 
 struct PlanOptions {
-  TraceOptions trace;     ///< of the run that is planned; its effects do not matter
-  double error = 0.01;    ///< half of it may be spent on leaving effects out
-  bool costs = true;      ///< estimate seconds and bytes too, by tracing a few tiles in full
-  bool vertices = false;  ///< rows are vertices: the view is not fixed
+  TraceOptions trace;        ///< of the run that is planned; its effects do not matter
+  double error = 0.01;       ///< half of it may be spent on leaving effects out
+  bool costs = true;         ///< estimate seconds and bytes too, by tracing a few tiles in full
+  bool vertices = false;     ///< rows are vertices: the view is not fixed
+  TermOptions terms;         ///< of their BRDFs
+  int terms_per_vertex = 1;  ///< rows a vertex has, set by plan_mesh()
 };
 
 /// The tiles of a run with the given options, made as often as needed.

@@ -2,6 +2,10 @@
 
 #include "precompute/plan_scene.h"
 
+#include <cstdint>
+#include <optional>
+#include <vector>
+
 #include "precompute/mesh_tiles.h"
 #include "precompute/picture_tiles.h"
 #include "precompute/precompute_mesh.h"
@@ -24,13 +28,33 @@ Plan plan_image(const Scene& scene, const Camera& camera, const PlanOptions& opt
 
 Plan plan_mesh(const Scene& scene, const PlanOptions& options) {
   const Visibility visibility(scene);
-  const VertexSampler sampler(scene, visibility);
+  VertexSampler sampler(scene, visibility);
+  // Outgoing factors are orthonormal over the hemisphere: how far rows of terms are apart is how
+  // far pictures are on the mean over all views. With the diffuse part by itself the rows without
+  // gloss are the same without the others.
+  std::optional<VertexTerms> terms;
+  if (sampler.view_dependent() > 0) {
+    TermOptions apart = options.terms;
+    apart.apart = true;
+    terms = vertex_terms(scene, sampler.materials(), apart);
+    sampler.set_terms(&*terms);
+  }
   const auto source = [&](const TraceOptions& trace) -> std::unique_ptr<TileSource> {
     return std::make_unique<MeshTiles>(sampler, scene, visibility, trace);
   };
   PlanOptions vertices = options;
   vertices.vertices = true;
-  Plan plan = make_plan(scene, source, mesh_row_order(transport_mesh(scene)), vertices);
+  vertices.terms_per_vertex = sampler.terms();
+  std::vector<std::uint32_t> order = mesh_row_order(transport_mesh(scene), sampler.terms());
+  if (terms) {  // rows of terms that a vertex does not have are empty
+    const auto count = static_cast<std::uint32_t>(terms->terms);
+    for (std::uint32_t& output : order) {
+      if (output == kNoOutput) continue;
+      const TermSet& set = terms->set[terms->set_of[output / count]];
+      if (static_cast<int>(output % count) >= set.terms()) output = kNoOutput;
+    }
+  }
+  Plan plan = make_plan(scene, source, order, vertices);
   plan.notes = scene_notes(scene, visibility, nullptr);
   return plan;
 }

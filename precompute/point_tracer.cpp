@@ -10,9 +10,12 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstdlib>
 #include <optional>
 
+#include "core/frame.h"
 #include "precompute/glossy_lobe.h"
+#include "precompute/incoming_term.h"
 #include "precompute/random.h"
 #include "precompute/specular_path.h"
 
@@ -240,12 +243,96 @@ void PointTracer::draw_lobe(const ShadingPoint& point, std::vector<Deposit>& dep
   flush();
 }
 
-void PointTracer::trace(const ShadingPoint& point, const PointRow& row, PointScratch& scratch,
-                        RayCounts& counts) const {
+// Which texels are seen, and which need all of their samples.
+void PointTracer::look(const ShadingPoint& point, PointScratch& scratch, RayCounts& counts) const {
   const std::size_t words = (table_.texels() + 63) / 64;
   scratch.known.assign(words, 0);
   scratch.visible.assign(words, 0);
   scratch.refine.assign(words, 0);
+  ++counts.points;
+  first_pass(point, scratch, counts);
+  if (adaptive_) {
+    if (table_.samples > 1) mark_differences(scratch);
+  } else {
+    for (std::size_t w = 0; w < words; ++w) scratch.refine[w] |= scratch.known[w];
+  }
+}
+
+void PointTracer::trace_terms(const ShadingPoint& point, std::span<const IncomingTerm* const> terms,
+                              std::span<const std::span<float>> rows, PointScratch& scratch,
+                              RayCounts& counts) const {
+  look(point, scratch, counts);
+  int most_order = 0;
+  for (const IncomingTerm* term : terms) most_order = std::max(most_order, std::abs(term->order));
+  for (const std::span<float> row : rows) std::fill(row.begin(), row.end(), 0.0f);
+  scratch.turns.resize(2 * static_cast<std::size_t>(most_order) + 2);
+  float* const cosine_of = scratch.turns.data();
+  float* const sine_of = cosine_of + most_order + 1;
+
+  const Frame frame(point.normal);
+  const FloatVec x_axis(frame.x), y_axis(frame.y), normal(frame.z),
+      geometric(point.geometric_normal);
+  const auto samples = static_cast<std::size_t>(table_.samples);
+  // What sample `s` of a texel that is seen there is worth.
+  const auto add = [&](std::size_t texel, std::size_t s) {
+    const DirectionTable::Sample& d = table_.sample[texel * samples + s];
+    const float z = normal.dot(d.x, d.y, d.z);
+    if (!(z > 0) || !(geometric.dot(d.x, d.y, d.z) > 0)) return;
+    const float x = x_axis.dot(d.x, d.y, d.z), y = y_axis.dot(d.x, d.y, d.z);
+    const float across = std::sqrt(x * x + y * y);
+    const float c = across > 1e-12f ? x / across : 1, si = across > 1e-12f ? y / across : 0;
+    cosine_of[0] = 1, sine_of[0] = 0;
+    for (int m = 1; m <= most_order; ++m) {
+      cosine_of[m] = cosine_of[m - 1] * c - sine_of[m - 1] * si;
+      sine_of[m] = sine_of[m - 1] * c + cosine_of[m - 1] * si;
+    }
+    // 1 - cos theta without its cancellation near the normal.
+    const float t = std::sqrt(z > 0.9f ? across * across / (1 + z) : 1 - z);
+    for (std::size_t k = 0; k < terms.size(); ++k) {
+      const int m = terms[k]->order;
+      rows[k][texel] += terms[k]->at(t) * (m >= 0 ? cosine_of[m] : sine_of[-m]) * d.solid_angle;
+    }
+  };
+
+  alignas(32) float x[8] = {}, y[8] = {}, z[8] = {};
+  std::size_t texel_at[8], sample_at[8];
+  unsigned waiting = 0;
+  const auto flush = [&] {
+    if (waiting == 0) return;
+    unsigned blocked = 0;
+    if (shadows_) {
+      blocked = visibility_.occluded8(point.origin, x, y, z, (1u << waiting) - 1);
+      counts.shadow += waiting;
+    }
+    for (unsigned i = 0; i < waiting; ++i) {
+      if (!(blocked >> i & 1u)) add(texel_at[i], sample_at[i]);
+    }
+    waiting = 0;
+  };
+  for (std::size_t w = 0; w < scratch.known.size(); ++w) {
+    for (std::uint64_t bits = scratch.visible[w] & ~scratch.refine[w]; bits != 0;
+         bits &= bits - 1) {
+      const std::size_t texel = 64 * w + static_cast<std::size_t>(std::countr_zero(bits));
+      for (std::size_t s = 0; s < samples; ++s) add(texel, s);
+    }
+    for (std::uint64_t bits = scratch.refine[w]; bits != 0; bits &= bits - 1) {
+      const std::size_t texel = 64 * w + static_cast<std::size_t>(std::countr_zero(bits));
+      if (get(scratch.visible, texel)) add(texel, 0);  // traced in the first pass
+      for (std::size_t s = 1; s < samples; ++s) {
+        const DirectionTable::Sample& d = table_.sample[texel * samples + s];
+        if (!(normal.dot(d.x, d.y, d.z) > 0) || !(geometric.dot(d.x, d.y, d.z) > 0)) continue;
+        x[waiting] = d.x, y[waiting] = d.y, z[waiting] = d.z;
+        texel_at[waiting] = texel, sample_at[waiting] = s;
+        if (++waiting == 8) flush();
+      }
+    }
+  }
+  flush();
+}
+
+void PointTracer::trace(const ShadingPoint& point, const PointRow& row, PointScratch& scratch,
+                        RayCounts& counts) const {
+  const std::size_t words = (table_.texels() + 63) / 64;
   scratch.first_weights.resize(static_cast<std::size_t>(table_.samples));
   scratch.second_weights.resize(static_cast<std::size_t>(table_.samples));
   std::fill(row.diffuse.begin(), row.diffuse.end(), 0.0f);
@@ -253,14 +340,7 @@ void PointTracer::trace(const ShadingPoint& point, const PointRow& row, PointScr
     std::fill(row.first.begin(), row.first.end(), 0.0f);
     std::fill(row.second.begin(), row.second.end(), 0.0f);
   }
-  ++counts.points;
-
-  first_pass(point, scratch, counts);
-  if (adaptive_) {
-    if (table_.samples > 1) mark_differences(scratch);
-  } else {
-    for (std::size_t w = 0; w < words; ++w) scratch.refine[w] |= scratch.known[w];
-  }
+  look(point, scratch, counts);
 
   std::optional<GlossyLobe> lobe;
   if (point.glossy) lobe.emplace(table_, point.bsdf);

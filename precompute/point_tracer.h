@@ -56,6 +56,7 @@ struct RayCounts {
 struct PointScratch {
   std::vector<std::uint64_t> known, visible, refine;  // a bit a texel
   std::vector<float> first_weights, second_weights;
+  std::vector<float> turns;   // cosines and sines of multiples of an angle
   std::vector<float> second;  // for callers that do not want it
 };
 
@@ -85,6 +86,13 @@ class PointTracer {
   void trace(const ShadingPoint& point, std::span<float> lambert, std::span<float> lobe,
              PointScratch& scratch, RayCounts& counts) const;
 
+  /// The rows of several terms of a BRDF at once: per term, V_s f_k(w_s) dw_s summed over the
+  /// samples of each texel. `rows` are one a term, table().texels() each, replaced. point.bsdf and
+  /// its term do not matter.
+  void trace_terms(const ShadingPoint& point, std::span<const IncomingTerm* const> terms,
+                   std::span<const std::span<float>> rows, PointScratch& scratch,
+                   RayCounts& counts) const;
+
   /// Appends the light that reaches the point, already coloured by its BSDF, by way of mirrors and
   /// glass and nothing else: every sample of a texel that one of them blocks is followed until it
   /// leaves the scene. Right after trace() of the same point with the same scratch.
@@ -98,6 +106,7 @@ class PointTracer {
   void mark_differences(PointScratch& scratch) const;
   void refine(const ShadingPoint& point, const GlossyLobe* lobe, const PointRow& row,
               PointScratch& scratch, RayCounts& counts) const;
+  void look(const ShadingPoint& point, PointScratch& scratch, RayCounts& counts) const;
   void draw_lobe(const ShadingPoint& point, std::vector<Deposit>& deposits,
                  RayCounts& counts) const;
 

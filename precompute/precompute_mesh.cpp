@@ -22,9 +22,23 @@ namespace haarlight {
 namespace {
 
 // Part of the fingerprint: raised whenever the same input would give other vertices.
-constexpr int kVertexVersion = 1;
+constexpr int kVertexVersion = 2;
 
 constexpr double kSubdivisionShare = 0.1;  // of the progress shown
+
+// What the file says of its terms: a material's name, how many it has and what they leave of it.
+nlohmann::json terms_meta(const Scene& scene, const VertexTerms& terms,
+                          const TermOptions& options) {
+  nlohmann::json meta{
+      {"asked", options.terms > 0 ? nlohmann::json(options.terms) : nlohmann::json("auto")},
+      {"error_wanted", options.error}};
+  for (const TermSet& set : terms.set) {
+    meta["materials"].push_back({{"name", scene.material[set.material].name},
+                                 {"terms", set.terms()},
+                                 {"error", set.error}});
+  }
+  return meta;
+}
 
 }  // namespace
 
@@ -58,6 +72,8 @@ std::string mesh_fingerprint(const Scene& scene, const Camera& camera, const Mes
   hash.add(kVertexVersion);
   hash.add(precompute_fingerprint(scene, camera, options));
   hash.add(options.subdivide), hash.add(options.max_vertices);
+  const TermOptions& t = options.terms;
+  hash.add(t.terms), hash.add(t.error), hash.add(t.most), hash.add(t.apart);
   return hash.text();
 }
 
@@ -67,6 +83,7 @@ MeshReport precompute_mesh(const Scene& scene, const Camera& camera, const MeshO
   std::optional<Scene> fine;
   std::optional<Visibility> visibility;
   std::optional<VertexSampler> sampler;
+  std::optional<VertexTerms> terms;
   std::optional<MeshTiles> tiles;
   TileRun run;
   const double first = options.subdivide ? kSubdivisionShare : 0;
@@ -77,6 +94,7 @@ MeshReport precompute_mesh(const Scene& scene, const Camera& camera, const MeshO
   together(options.distribution, [&] {
     check(static_cast<const RunOptions&>(options));
     check(options.trace);
+    check(options.terms);
     check(camera);
     check_output(file);
 
@@ -95,6 +113,15 @@ MeshReport precompute_mesh(const Scene& scene, const Camera& camera, const MeshO
 
     sampler.emplace(*fine, *visibility);
     report.view_dependent = sampler->view_dependent();
+    if (options.trace.effects.gloss && report.view_dependent > 0) {
+      terms = vertex_terms(*fine, sampler->materials(), options.terms);
+      sampler->set_terms(&*terms);
+      report.terms = terms->terms;
+      report.terms_error = terms->worst_error;
+      report.terms_material = terms->worst_material;
+      run.info.terms = terms->terms;
+      run.info.view = terms->view;
+    }
     tiles.emplace(*sampler, scene, *visibility, options.trace);
     run.info.kind = TransportKind::mesh;
     run.info.face_size = options.trace.face_size;
@@ -107,6 +134,7 @@ MeshReport precompute_mesh(const Scene& scene, const Camera& camera, const MeshO
     meta["options"]["subdivide"] = options.subdivide;
     meta["options"]["max_vertices"] = options.max_vertices;
     meta["view_dependent_vertices"] = report.view_dependent;
+    if (terms) meta["terms"] = terms_meta(scene, *terms, options.terms);
     run.meta = meta_text(meta);
   });
   RunOptions rest = options;

@@ -11,6 +11,7 @@
 #include "precompute/precompute.h"
 #include "precompute/scene.h"
 #include "precompute/subdivide.h"
+#include "precompute/vertex_terms.h"
 #include "prt/transport_mesh.h"
 
 namespace haarlight {
@@ -20,6 +21,7 @@ struct MeshOptions : PrecomputeOptions {
   bool subdivide = true;       ///< where visibility changes; see precompute/subdivide.h.
                                ///< The tolerance there is `error`, at least 0.005
   int max_vertices = 100'000;  ///< that subdivision may lead to
+  TermOptions terms;           ///< of BRDFs, with effect gloss; without, diffuse parts alone
 };
 
 /// What making one did beside the report of all runs.
@@ -27,12 +29,17 @@ struct MeshReport {
   PrecomputeReport run;
   SubdivideReport subdivision;  ///< sizes of the mesh, subdivided or not
   double subdivision_seconds = 0;
-  std::int64_t view_dependent = 0;  ///< vertices whose lobe, mirror or glass was left out
+  std::int64_t view_dependent = 0;  ///< vertices with a lobe, a mirror or glass
+  int terms = 1;                    ///< of a vertex' BRDF, at most
+  double terms_error = 0;           ///< what they leave of the BRDF that they fit worst
+  std::string terms_material;       ///< the name of that one's material
 };
 
 /// Traces the light of every vertex of `scene`, subdivided where visibility changes, and writes
 /// `file`: pilots, thresholds and resuming as precompute_image() does them. `camera` is the view
-/// the mesh is first shown from. Materials keep their diffuse part (see VertexSampler). Throws as
+/// the mesh is first shown from. With effect gloss the
+/// BRDFs of vertices are factored into terms and seen from anywhere (see VertexTerms); without it,
+/// materials keep their diffuse part. Glass stays black. Throws as
 /// precompute_image() does.
 MeshReport precompute_mesh(const Scene& scene, const Camera& camera, const MeshOptions& options,
                            const std::filesystem::path& file, const Progress& progress = {});

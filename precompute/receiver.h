@@ -17,6 +17,7 @@ struct Receiver {
   RgbD weight;            ///< share of the row, times what mirrors and glass on the way let through
   Vec3 position;          ///< local coordinates of Visibility, on the surface
   Bsdf bsdf;
+  std::uint32_t vertex = 0;  ///< of a mesh: rows of its terms share what is traced
 };
 
 /// A line of sight that leaves the scene by way of mirrors or glass.

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,12 +16,15 @@
 
 namespace haarlight {
 
+struct MeasuredBrdf;  // precompute/measured_brdf.h
+
 /// How a surface reflects; all are two-sided.
 enum class SurfaceModel {
   phong,               ///< Lambert plus one Phong lobe
   metallic_roughness,  ///< glTF 2.0: Lambert under a GGX lobe, see precompute/bsdf.h
   mirror,              ///< perfect reflection of share `albedo`
-  glass                ///< smooth dielectric: Fresnel reflection and refraction
+  glass,               ///< smooth dielectric: Fresnel reflection and refraction
+  measured             ///< a table; see Material::measured
 };
 
 /// phong: f_r = albedo / pi + specular (e + 2) / (2 pi) max(0, cos alpha)^e, alpha the angle
@@ -42,6 +46,9 @@ struct Material {
   int metallic_roughness_texture = -1;  ///< index into Scene::texture (linear values), or none
   float transmission = 0;  ///< [0, 1]: share of the diffuse part that passes straight through a
                            ///< thin wall instead (KHR_materials_transmission without volume)
+  // measured
+  std::shared_ptr<const MeasuredBrdf> measured;  ///< else null. Per vertex, its factors are shown;
+                                                 ///< elsewhere it is Lambert of the same albedo
   // metallic_roughness and glass
   float ior = 1.5f;   ///< index of refraction, >= 1
   Rgb extinction{};   ///< glass: 1/m inside; light is weakened by exp(-extinction distance)

@@ -85,6 +85,13 @@ std::vector<std::string> named_in_gltf(const std::string& bytes) {
       if (uri.compare(0, 5, "data:") != 0) names.push_back(percent_decoded(uri));
     }
   }
+  if (!root.contains("materials") || !root["materials"].is_array()) return names;
+  for (const nlohmann::json& material : root["materials"]) {
+    const nlohmann::json::json_pointer at("/extras/haarlight/measured");
+    if (material.contains(at) && material.at(at).is_string()) {
+      names.push_back(material.at(at).get<std::string>());
+    }
+  }
   return names;
 }
 

@@ -73,9 +73,13 @@ void add_materials(const aiScene& file, FileType type, const std::vector<GltfMat
       if (!scene.tint.empty()) out.albedo = {1, 1, 1};  // the colour is in the vertices
       out.name = "default";
     } else {
-      out = type == FileType::gltf ? import_gltf_material(numbers[m], in, textures, scene.report)
-                                   : import_obj_material(in, textures, scene, scene.report);
+      out = type == FileType::gltf
+                ? import_gltf_material(numbers[m], in, textures, scene, scene.report)
+                : import_obj_material(in, textures, scene, scene.report);
       out.name = name;
+      if (type == FileType::gltf && !numbers[m].measured.empty()) {
+        set_measured(out, folder / numbers[m].measured);
+      }
     }
     scene.material.push_back(out);
   }

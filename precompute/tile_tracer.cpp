@@ -141,6 +141,50 @@ void TileTracer::add_direct(const Receiver& receiver, bool first, Scratch& scrat
   }
 }
 
+// The direct light of all terms of one vertex, which look from one place: by the first of them.
+// Replaces what is in their rows.
+void TileTracer::add_terms(const TileReceivers& receivers, std::size_t first, Scratch& scratch,
+                           const std::function<float*(std::size_t channel, std::size_t row)>& to,
+                           std::span<const bool> open, std::span<const RgbD> base,
+                           RayCounts& counts) const {
+  const auto size = static_cast<std::size_t>(layout_.size());
+  std::vector<std::size_t> of_vertex;
+  std::vector<const IncomingTerm*> terms;
+  for (std::size_t i = first; i < receivers.receivers.size(); ++i) {
+    const Receiver& r = receivers.receivers[i];
+    if (!r.bsdf.term || r.vertex != receivers.receivers[first].vertex) continue;
+    of_vertex.push_back(i);
+    terms.push_back(r.bsdf.term);
+  }
+  scratch.term_rows.resize(terms.size() * size);
+  std::vector<std::span<float>> rows;
+  for (std::size_t k = 0; k < terms.size(); ++k) {
+    rows.push_back(std::span(scratch.term_rows).subspan(k * size, size));
+  }
+  points_.trace_terms(shading_point(receivers.receivers[first]), terms, rows, scratch.point,
+                      counts);
+  const bool caustics =
+      options_.effects.caustics && options_.effects.shadows && visibility_.has_specular();
+  for (std::size_t k = 0; k < terms.size(); ++k) {
+    const Receiver& r = receivers.receivers[of_vertex[k]];
+    scratch.term_done.push_back(of_vertex[k]);
+    scratch.deposits.clear();
+    if (caustics) {
+      points_.trace_caustics(scene_, shading_point(r), scratch.point, scratch.deposits, counts);
+    }
+    for (std::size_t c = 0; c < (open[r.row] ? 3u : 1u); ++c) {
+      const auto factor = [&](const RgbD& value) {
+        return static_cast<float>(open[r.row] ? channel(value, c)
+                                              : multiple_of(value, base[r.row]));
+      };
+      float* const sum = to(c, r.row);
+      const float f = factor(r.weight);
+      for (std::size_t t = 0; t < size; ++t) sum[t] = f * rows[k][t];
+      for (const Deposit& d : scratch.deposits) sum[d.texel] += factor(r.weight * d.value);
+    }
+  }
+}
+
 void TileTracer::trace(const TileReceivers& receivers, Scratch& scratch, TileRows& tile,
                        RayCounts& counts, TileNoise* noise) const {
   const auto size = static_cast<std::size_t>(layout_.size());
@@ -189,15 +233,27 @@ void TileTracer::trace(const TileReceivers& receivers, Scratch& scratch, TileRow
     return scratch.texels.data() + (c * kRows + row) * size;
   };
   if (paths_) paths_->begin(*scratch.paths);
+  std::array<bool, kRows> is_open{};
   for (std::size_t row = 0; row < kRows; ++row) {
-    const bool open = (open_blocks >> (row / kBlockRows) & 1u) != 0;
+    is_open[row] = (open_blocks >> (row / kBlockRows) & 1u) != 0;
+  }
+  scratch.term_done.clear();
+  for (std::size_t row = 0; row < kRows; ++row) {
+    const bool open = is_open[row];
     const std::size_t own_channels = open ? 3 : 1;
     std::array<float*, 3> to{};
     for (std::size_t c = 0; c < own_channels; ++c) to[c] = row_of(c, row);
     const std::span<float* const> into(to.data(), own_channels);
     bool first = true;
     for (const std::size_t i : scratch.of_row[row]) {
-      add_direct(receivers.receivers[i], first, scratch, into, base[row], counts);
+      if (receivers.receivers[i].bsdf.term) {  // alone in its row
+        if (std::find(scratch.term_done.begin(), scratch.term_done.end(), i) ==
+            scratch.term_done.end()) {
+          add_terms(receivers, i, scratch, row_of, is_open, base, counts);
+        }
+      } else {
+        add_direct(receivers.receivers[i], first, scratch, into, base[row], counts);
+      }
       first = false;
     }
     if (first) {

@@ -2,7 +2,9 @@
 
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -57,6 +59,8 @@ class TileTracer {
     std::vector<float> diffuse, first, second, texels;
     std::vector<Deposit> deposits;
     std::vector<std::vector<std::size_t>> of_row;
+    std::vector<float> term_rows;        // of the terms of one vertex
+    std::vector<std::size_t> term_done;  // receivers whose direct light is there
     std::unique_ptr<Interreflection::Scratch, void (*)(Interreflection::Scratch*)> paths;
     double transform_seconds = 0;  ///< spent on wavelets by all calls
   };
@@ -83,6 +87,9 @@ class TileTracer {
   const TraceOptions& options() const { return options_; }
 
  private:
+  void add_terms(const TileReceivers& receivers, std::size_t first, Scratch& scratch,
+                 const std::function<float*(std::size_t channel, std::size_t row)>& to,
+                 std::span<const bool> open, std::span<const RgbD> base, RayCounts& counts) const;
   void add_direct(const Receiver& receiver, bool first, Scratch& scratch,
                   std::span<float* const> channels, const RgbD& base, RayCounts& counts) const;
 

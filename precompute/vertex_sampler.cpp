@@ -196,17 +196,8 @@ Vec3 VertexSampler::origin(std::uint32_t vertex) const {
   return inside + height * off;
 }
 
-Receiver VertexSampler::receiver(std::uint32_t vertex, std::uint32_t row) const {
-  Receiver r;
-  r.row = row;
-  r.weight = {1, 1, 1};
-  const Vec3 normal = scene_.normal[vertex];
-  // What looks from a receiver moves off the surface along this normal; origin() already has.
-  r.position = origin(vertex) - Visibility::kSurfaceOffset * normal;
-
-  SurfaceHit hit;
-  hit.position = r.position;
-  hit.geometric_normal = hit.normal = hit.to_viewer = normal;
+VertexMaterial VertexSampler::material_at(std::uint32_t vertex) const {
+  VertexMaterial hit;
   hit.material = material_[vertex] == kNone ? 0 : material_[vertex];
   const Material& material = scene_.material[hit.material];
   const double u = scene_.texture.empty() ? 0 : static_cast<double>(scene_.uv[vertex][0]);
@@ -222,6 +213,36 @@ Receiver VertexSampler::receiver(std::uint32_t vertex, std::uint32_t row) const 
     const Rgb factor = texel(material.metallic_roughness_texture);
     hit.metallic *= factor.b, hit.roughness *= factor.g;
   }
+  return hit;
+}
+
+std::vector<VertexMaterial> VertexSampler::materials() const {
+  std::vector<VertexMaterial> all;
+  for (std::uint32_t v = 0; v < material_.size(); ++v) all.push_back(material_at(v));
+  return all;
+}
+
+Receiver VertexSampler::receiver(std::uint32_t vertex, std::uint32_t row) const {
+  return receiver_at(vertex, row, origin(vertex));
+}
+
+Receiver VertexSampler::receiver_at(std::uint32_t vertex, std::uint32_t row,
+                                    const Vec3& from) const {
+  Receiver r;
+  r.row = row;
+  r.vertex = vertex;
+  r.weight = {1, 1, 1};
+  const Vec3 normal = scene_.normal[vertex];
+  // What looks from a receiver moves off the surface along this normal; origin() already has.
+  r.position = from - Visibility::kSurfaceOffset * normal;
+
+  const VertexMaterial here = material_at(vertex);
+  SurfaceHit hit;
+  hit.position = r.position;
+  hit.geometric_normal = hit.normal = hit.to_viewer = normal;
+  hit.material = here.material;
+  hit.albedo = here.albedo;
+  hit.metallic = here.metallic, hit.roughness = here.roughness;
   r.bsdf = bsdf_at(scene_, hit);
   r.bsdf.geometric_normal = r.bsdf.normal = r.bsdf.to_viewer = normal;
 
@@ -238,6 +259,24 @@ Receiver VertexSampler::receiver(std::uint32_t vertex, std::uint32_t row) const 
   return r;
 }
 
+// Makes of the diffuse receiver that of a term; false: the vertex has no such term.
+bool VertexSampler::make_term(std::uint32_t vertex, int term, Receiver& r) const {
+  const TermSet& set = terms_->set[terms_->set_of[vertex]];
+  if (material_[vertex] == kNone || term >= set.terms()) return false;
+  Bsdf& b = r.bsdf;
+  if (set.diffuse_apart && term == 0) {
+    if (b.coat_f0 > 0 && b.has_diffuse()) {  // what the coat lets out is in the outgoing factor
+      b.diffuse_reflectance *= set.diffuse_scale / b.coat_pass;
+    }
+    return true;
+  }
+  b.coat_f0 = 0;
+  b.diffuse_reflectance = {1, 1, 1};
+  b.term = &set.incoming[static_cast<std::size_t>(term - (set.diffuse_apart ? 1 : 0))];
+  r.weight = RgbD(terms_->lobe_tint[vertex]);
+  return true;
+}
+
 ShadingPoint VertexSampler::point(std::uint32_t vertex) const {
   ShadingPoint p;
   const Vec3 from = origin(vertex);
@@ -251,8 +290,19 @@ void VertexSampler::sample(std::span<const std::uint32_t> outputs, TileReceivers
   tile.coverage.assign(kTileRows, 0.0f);
   for (std::size_t row = 0; row < outputs.size(); ++row) {
     if (outputs[row] == kNoOutput) continue;
-    tile.receivers.push_back(receiver(outputs[row], static_cast<std::uint32_t>(row)));
     tile.coverage[row] = 1;
+    const auto count = static_cast<std::uint32_t>(terms());
+    const std::uint32_t vertex = outputs[row] / count;
+    // Rows of a vertex' terms are a block apart: what is found of one is kept for the next.
+    const Receiver* same = nullptr;
+    for (const Receiver& r : tile.receivers) {
+      if (terms_ && r.vertex == vertex) same = &r;
+    }
+    const Vec3 from =
+        same ? same->position + Visibility::kSurfaceOffset * scene_.normal[vertex] : origin(vertex);
+    Receiver r = receiver_at(vertex, static_cast<std::uint32_t>(row), from);
+    if (terms_ && !make_term(vertex, static_cast<int>(outputs[row] % count), r)) continue;
+    tile.receivers.push_back(r);
   }
 }
 

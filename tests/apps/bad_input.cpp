@@ -330,6 +330,33 @@ TEST_F(BadInput, RepairsAreSaidOnceAndTheWorkGoesOn) {
   EXPECT_EQ(result.err.find("negative", place + line.size()), std::string::npos);
 }
 
+// A table of another size, of no such material, and options that mean nothing together.
+TEST_F(BadInput, MeasuredBrdfs) {
+  write_bytes(path("shiny.obj"),
+              "mtllib shiny.mtl\nv 0 0 0\nv 0 0 1\nv 1 0 0\nusemtl red\nf 1 2 3\n");
+  write_bytes(path("shiny.mtl"), "newmtl red\nKd 0.2 0.1 0.1\nKs 0.5 0.5 0.5\nNs 10\n");
+  write_bytes(path("cut.binary"), std::string("\x04\0\0\0\x03\0\0\0\x02\0\0\0", 12) + "short");
+  write_bytes(path("empty.binary"), "");
+  const auto with = [](const std::string& pair) {
+    return std::vector<std::string>{"precompute", "shiny.obj", "-o",     "shiny.hlt", "--vertices",
+                                    "--face",     "8",         "--merl", pair};
+  };
+  expect_stated_error(with("red=cut.binary"), {"cut.binary", "4 x 3 x 2", "588"});
+  expect_stated_error(with("red=empty.binary"), {"empty.binary", "0 bytes"});
+  expect_stated_error(with("red=none.binary"), {"none.binary"});
+  expect_stated_error(with("red=shiny.obj"), {"shiny.obj", "MERL"});
+  expect_stated_error(with("blue=cut.binary"), {"blue", "\"red\""});
+  expect_stated_error(with("red"), {"--merl", "MATERIAL=FILE"});
+  for (const char* terms : {"0", "65", "-1", "many", "4.5"}) {
+    const ProgramResult result = run({"precompute", "shiny.obj", "-o", "shiny.hlt", "--vertices",
+                                      "--face", "8", "--terms", terms});
+    EXPECT_EQ(result.code, 2) << terms;
+    EXPECT_NE(result.err.find("--terms"), std::string::npos) << result.err;
+  }
+  EXPECT_EQ(run({"precompute", "shiny.obj", "-o", "shiny.hlt", "--terms", "4"}).code, 2);
+  EXPECT_FALSE(fs::exists(path("shiny.hlt")));
+}
+
 TEST_F(BadInput, Comparisons) {
   save_image(path("small.exr"), Image(3, 2));
   expect_stated_error({"compare", "room.exr", "none.exr"}, {"none.exr"});

@@ -23,7 +23,7 @@ struct VerbOptions {
 const std::vector<VerbOptions> kVerbs{
     {"precompute",
      {"--output", "--view", "--size", "--face", "--spp", "--uniform-spp", "--pixel-samples",
-      "--error", "--threads", "--resume", "--ground"}},
+      "--error", "--threads", "--resume", "--ground", "--terms", "--terms-error", "--merl"}},
     {"relight", {"--env",     "--output",   "--env-to",  "--projection",    "--motion",
                  "--degrees", "--frames",   "--stop",    "--method",        "--wavelets",
                  "--weight",  "--bands",    "--every",   "--from-dark",     "--save-frames",

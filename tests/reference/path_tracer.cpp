@@ -161,6 +161,10 @@ PathTracer::PathTracer(const Scene& scene, const Sky& sky, const PathOptions& op
   }
   for (const Material& m : scene.material) {
     has_holes_ = has_holes_ || m.alpha_cutoff > 0;
+    if (m.model == SurfaceModel::measured) {
+      throw Error(ErrorKind::invalid_argument,
+                  "a measured BRDF, which the reference does not know");
+    }
     if (m.normal_texture >= 0) {
       throw Error(ErrorKind::invalid_argument,
                   scene.name + ": material " + m.name + " has a normal texture, expected none");
@@ -228,6 +232,8 @@ PathTracer::Surface PathTracer::surface(const TriangleTree::Hit& hit, const Vec3
                                           interpolate(u, hit), interpolate(v, hit)));
   }
   switch (m.model) {
+    case SurfaceModel::measured:  // refused by the constructor
+      break;
     case SurfaceModel::phong:
       s.diffuse = albedo;
       s.diffuse_chance = largest(albedo);

@@ -46,7 +46,8 @@ struct Estimate {
 /// own.
 class PathTracer {
  public:
-  /// Throws Error{missing} without triangles, Error{invalid_argument} for a normal texture.
+  /// Throws Error{missing} without triangles, Error{invalid_argument} for a normal texture
+  /// or a measured BRDF.
   PathTracer(const Scene& scene, const Sky& sky, const PathOptions& options = {});
 
   /// Radiance arriving at `origin` (world) from the unit `direction`. `stream` tells estimates of
