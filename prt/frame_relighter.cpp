@@ -2,11 +2,17 @@
 
 #include "prt/frame_relighter.h"
 
+#include <fmt/format.h>
+
 #include <chrono>
+#include <cmath>
 #include <utility>
 #include <vector>
 
+#include "core/error.h"
 #include "core/image_metrics.h"
+#include "prt/completeness.h"
+#include "prt/error_limit.h"
 
 namespace haarlight {
 namespace {
@@ -23,6 +29,23 @@ LightingOptions with_weights(LightingOptions lighting, WaveletWeight weight,
   return lighting;
 }
 
+double picture_norm(const Image& picture) {
+  double sum = 0;
+  for (const Rgb& p : picture.pixels) {
+    const RgbD d(p);
+    sum += d.r * d.r + d.g * d.g + d.b * d.b;
+  }
+  return std::sqrt(sum);
+}
+
+std::vector<double> column_bytes(const Transport& transport) {
+  std::vector<double> bytes(static_cast<std::size_t>(transport.layout().size()));
+  for (std::size_t j = 0; j < bytes.size(); ++j) {
+    bytes[j] = static_cast<double>(transport.column_bytes(static_cast<int>(j)));
+  }
+  return bytes;
+}
+
 }  // namespace
 
 FrameRelighter::FrameRelighter(const Transport& transport, LightingOptions lighting,
@@ -32,6 +55,7 @@ FrameRelighter::FrameRelighter(const Transport& transport, LightingOptions light
       make_(std::move(make)),
       relighter_(make_relighter(make_, transport)) {
   relighter_->expect_resets(tracker_.options().method == LightingMethod::pbi);
+  transport_error_ = measured_error(transport.info().meta);
 }
 
 void FrameRelighter::set_options(const LightingOptions& lighting, WaveletWeight weight) {
@@ -80,6 +104,77 @@ void FrameRelighter::go_dark() {
   tracker_.set_options(options);
 }
 
+bool FrameRelighter::can_judge() const {
+  return relighter_->shows_rows() && ErrorEstimator::fits(transport());
+}
+
+void FrameRelighter::set_budget(const FrameBudget& budget) {
+  if (budget.kind != BudgetKind::wavelets && !(budget.value > 0 && std::isfinite(budget.value))) {
+    throw Error(ErrorKind::invalid_argument,
+                fmt::format("a budget of {}, expected a finite number above 0", budget.value));
+  }
+  if (budget.kind == BudgetKind::error && !can_judge()) {
+    throw Error(ErrorKind::invalid_argument,
+                "an error as budget, expected a transport whose picture's error can be estimated: "
+                "of a picture, or of a mesh with one term a vertex");
+  }
+  budget_ = budget;
+}
+
+ErrorEstimator& FrameRelighter::estimator() {
+  if (!errors_) errors_.emplace(transport());
+  return *errors_;
+}
+
+const LightingUpdate& FrameRelighter::decide(std::span<const Rgb> target, FrameStart start) {
+  if (start == FrameStart::exact) return tracker_.start_exact(target);
+  if (tracker_.options().method == LightingMethod::reference) return tracker_.advance(target);
+  switch (budget_.kind) {
+    case BudgetKind::milliseconds:
+      return tracker_.advance(target, *time_);
+    case BudgetKind::error: {
+      ErrorLimit limit(*errors_, budget_.value);
+      return tracker_.advance(target, limit);
+    }
+    case BudgetKind::wavelets:
+      break;
+  }
+  return tracker_.advance(target);
+}
+
+void FrameRelighter::judge(std::span<const Rgb> target) {
+  metrics_.error_estimate.reset();
+  metrics_.error_bound.reset();
+  if (!(judge_ || budget_.kind == BudgetKind::error) || !can_judge()) return;
+  ErrorEstimator& errors = estimator();
+  if (transport().kind() == TransportKind::mesh && judged_from_ != relighter_->camera()) {
+    relighter_->vertex_weights(vertex_weights_);
+    errors.set_vertex_weights(vertex_weights_);
+    judged_from_ = relighter_->camera();
+  }
+  const PictureErrorGuess guess =
+      errors.judge(target, tracker_.shown(), picture_norm(relighter_->picture()));
+  metrics_.error_estimate = guess.estimate;
+  metrics_.error_bound = guess.bound;
+}
+
+void FrameRelighter::follow_flicker() {
+  const Image& picture = relighter_->picture();
+  const Image& exact = exact_->relighter->picture();
+  const bool first = !compared_before_ || picture_before_.pixels.size() != picture.pixels.size();
+  double difference = 0, norm = 0;
+  for (std::size_t i = 0; !first && i < picture.pixels.size(); ++i) {
+    const RgbD r(exact.pixels[i]);
+    const RgbD d = (RgbD(picture.pixels[i]) - RgbD(picture_before_.pixels[i])) -
+                   (r - RgbD(reference_before_.pixels[i]));
+    difference += d.r * d.r + d.g * d.g + d.b * d.b;
+    norm += r.r * r.r + r.g * r.g + r.b * r.b;
+  }
+  metrics_.flicker = difference > 0 ? std::sqrt(difference / norm) : 0;
+  picture_before_ = picture;
+  reference_before_ = exact;
+}
+
 const FrameMetrics& FrameRelighter::relight(std::span<const Rgb> target, FrameStart start,
                                             int frame) {
   if (start == FrameStart::dark) go_dark();
@@ -87,9 +182,17 @@ const FrameMetrics& FrameRelighter::relight(std::span<const Rgb> target, FrameSt
   const LightingOptions& lighting = tracker_.options();
 
   // Decide which wavelets change, stream their columns, make the picture.
+  if (budget_.kind == BudgetKind::error) estimator();
+  if (budget_.kind == BudgetKind::milliseconds && !time_) time_.emplace(column_bytes(transport()));
   const Clock::time_point begin = Clock::now();
-  const LightingUpdate& update =
-      start == FrameStart::exact ? tracker_.start_exact(target) : tracker_.advance(target);
+  if (budget_.kind == BudgetKind::milliseconds) {
+    reset_bytes_.resize(static_cast<std::size_t>(layout.band_count()));
+    for (int b = 0; b < layout.band_count(); ++b) {
+      reset_bytes_[static_cast<std::size_t>(b)] = relighter_->reset_bytes(b);
+    }
+    time_->start(budget_.value, begin, reset_bytes_, relighter_->fold_bytes());
+  }
+  const LightingUpdate& update = decide(target, start);
   const Clock::time_point decided = Clock::now();
   relighter_->set_exact(start == FrameStart::exact || lighting.method == LightingMethod::reference);
   const RelightStats stats = relighter_->apply(update);
@@ -98,8 +201,10 @@ const FrameMetrics& FrameRelighter::relight(std::span<const Rgb> target, FrameSt
 
   metrics_.frame = frame;
   metrics_.method = lighting.method;
-  metrics_.wavelets =
-      lighting.method == LightingMethod::reference ? layout.size() : lighting.wavelets;
+  metrics_.wavelets = lighting.method == LightingMethod::reference ? layout.size()
+                      : budget_.kind == BudgetKind::wavelets
+                          ? lighting.wavelets
+                          : static_cast<int>(update.deltas.size());
   metrics_.weight = weight_;
   metrics_.updates = static_cast<int>(update.deltas.size());
   metrics_.resets.clear();
@@ -111,12 +216,18 @@ const FrameMetrics& FrameRelighter::relight(std::span<const Rgb> target, FrameSt
   metrics_.apply_ms = stats.apply_ms;
   metrics_.finish_ms = stats.finish_ms;
   metrics_.total_ms = milliseconds(begin, end);
+  if (budget_.kind == BudgetKind::milliseconds && start != FrameStart::exact) {
+    time_->finish(metrics_.total_ms);
+  }
   metrics_.bytes = stats.apply.transport_bytes + stats.apply.sum_bytes;
 
   // The same frame under the exact lighting. Both pictures are black where the scene is not, so
   // sums over all pixels are sums over the scene's.
   metrics_.image_rel_rmse.reset();
   metrics_.image_max_abs.reset();
+  metrics_.flicker.reset();
+  metrics_.transport_error = transport_error_;
+  judge(target);
   if (compare_ && exact_) {
     exact_->relighter->set_camera(relighter_->camera());
     exact_->relighter->apply(exact_->tracker.advance(target));
@@ -124,7 +235,9 @@ const FrameMetrics& FrameRelighter::relight(std::span<const Rgb> target, FrameSt
         compare_images(relighter_->picture(), exact_->relighter->picture());
     metrics_.image_rel_rmse = difference.relative_rmse;
     metrics_.image_max_abs = difference.max_abs;
+    follow_flicker();
   }
+  compared_before_ = compare_;
   return metrics_;
 }
 

@@ -10,9 +10,12 @@
 #include <string>
 
 #include "core/image.h"
+#include "prt/error_estimator.h"
+#include "prt/frame_budget.h"
 #include "prt/lighting_tracker.h"
 #include "prt/relighter.h"
 #include "prt/scene_view.h"
+#include "prt/time_budget.h"
 #include "prt/transport.h"
 #include "prt/wavelet_weight.h"
 
@@ -22,7 +25,8 @@ namespace haarlight {
 struct FrameMetrics {
   int frame = 0;
   LightingMethod method = LightingMethod::pbi;
-  int wavelets = 0;  ///< budget of an update; all coefficients for the reference method
+  int wavelets = 0;  ///< most that an update could hold, by number; of a budget in time or error,
+                     ///< what it came to; all coefficients for the reference method
   WaveletWeight weight = WaveletWeight::area;
   int updates = 0;            ///< wavelets changed
   std::string resets;         ///< one digit a band, coarsest first; 1: the band was reset
@@ -35,6 +39,14 @@ struct FrameMetrics {
   double finish_ms = 0;     ///< sums to pixels, drawing of a mesh included
   double total_ms = 0;      ///< wall time from the target's coefficients to the picture
   std::uint64_t bytes = 0;  ///< of transport and of sums moved
+  /// Relative RMS of the picture's change since the frame before against that of the exact picture:
+  /// || (P - P') - (R - R') || / || R ||. 0 in a first frame. Only with against_reference.
+  std::optional<double> flicker;
+  /// What ErrorEstimator says of image_rel_rmse without a reference. Not for every transport.
+  std::optional<double> error_estimate, error_bound;
+  /// What compressing the transport cost, as its file states: relative RMS of the picture under the
+  /// worst of the lightings it was measured under. None where the file does not say.
+  std::optional<double> transport_error;
 };
 
 /// How a frame goes about its target.
@@ -56,6 +68,12 @@ class FrameRelighter {
   void set_options(const LightingOptions& lighting, WaveletWeight weight);
   /// Whether frames are also relit exactly. The first such frame after a pause costs a full one.
   void compare_with_reference(bool compare);
+  /// Whether frames say error_estimate and error_bound, where that can be. Not before it is asked
+  /// for is the transport read for it. Its time is in no metric.
+  void judge_errors(bool judge) { judge_ = judge; }
+  /// What ends updates from the next frame on. Throws Error{invalid_argument} for a value out of
+  /// range, or an error where none can be estimated.
+  void set_budget(const FrameBudget& budget);
 
   /// Relights towards `target`, layout.size() coefficients, valid until the next call; the frame's
   /// number is the caller's. Throws as LightingTracker::advance, and then changes nothing.
@@ -77,6 +95,11 @@ class FrameRelighter {
 
  private:
   void go_dark();
+  const LightingUpdate& decide(std::span<const Rgb> target, FrameStart start);
+  bool can_judge() const;
+  ErrorEstimator& estimator();
+  void judge(std::span<const Rgb> target);
+  void follow_flicker();
 
   LightingTracker tracker_;
   WaveletWeight weight_;
@@ -88,6 +111,16 @@ class FrameRelighter {
   };
   std::optional<Exact> exact_;
   bool compare_ = false;
+  FrameBudget budget_;
+  std::optional<TimeBudget> time_;         // of the last frames; made when first asked for
+  std::optional<ErrorEstimator> errors_;   // likewise
+  bool judge_ = false;
+  std::optional<Camera> judged_from_;      // the camera that errors_ knows
+  std::vector<float> vertex_weights_;
+  std::vector<double> reset_bytes_;
+  std::optional<double> transport_error_;
+  bool compared_before_ = false;
+  Image picture_before_, reference_before_;  // of the last frame that was compared, or empty
   const LightingUpdate* update_ = nullptr;
   FrameMetrics metrics_;
 };

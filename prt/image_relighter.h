@@ -22,6 +22,7 @@ class ImageRelighter {
   RelightStats apply(const LightingUpdate& update);
   /// See RowSums::expect_resets.
   void expect_resets(bool expected) { sums_.expect_resets(expected); }
+  const RowSums& sums() const { return sums_; }
   const Image& picture() const { return picture_; }
   const Transport& transport() const { return sums_.transport(); }
   std::uint64_t extra_bytes() const { return sums_.extra_bytes(); }

@@ -14,6 +14,7 @@
 namespace haarlight {
 namespace {
 
+constexpr int kMostExpected = 4096;  // for exhaustive band choice under a limit
 // Of a texel (see wavelet/environment.h); a scaling function sums n^2 of them over n.
 constexpr float kLargestRadiance = 1.8e18f;
 // What is less is taken as zero: 2^-100. Floats from there on are multiples of 2^-123, so that
@@ -153,7 +154,7 @@ BandMask LightingTracker::choose_bands_simply() const {
 
 // Overbeck 2006, 5.2.1: the error left by a combination is the sum of all keys less the largest
 // `wavelets` of them; every band and choice is sorted once, every combination merges.
-BandMask LightingTracker::choose_bands_exhaustively() {
+BandMask LightingTracker::choose_bands_exhaustively(int wavelets) {
   const auto bands = static_cast<std::size_t>(layout_.band_count());
   unsigned resettable = 0;
   for (std::size_t b = 0; b < bands; ++b) {
@@ -162,7 +163,7 @@ BandMask LightingTracker::choose_bands_exhaustively() {
       const std::vector<float>& keys = choice ? reset_key_ : keep_key_;
       const std::span<const float> band_keys(keys.data() + range.begin,
                                              static_cast<std::size_t>(range.size()));
-      top_k_.select(band_keys, options_.wavelets, band_chosen_);
+      top_k_.select(band_keys, wavelets, band_chosen_);
       std::vector<float>& sorted = sorted_keys_[2 * b + choice];
       sorted.clear();
       for (int i : band_chosen_) sorted.push_back(band_keys[static_cast<std::size_t>(i)]);
@@ -177,7 +178,7 @@ BandMask LightingTracker::choose_bands_exhaustively() {
     double error = 0;
     std::array<std::size_t, HaarLayout::kMaxBands> next{};
     for (std::size_t b = 0; b < bands; ++b) error += mask >> b & 1 ? reset_norm_[b] : keep_norm_[b];
-    for (int taken = 0; taken < options_.wavelets; ++taken) {
+    for (int taken = 0; taken < wavelets; ++taken) {
       float largest = 0;
       std::size_t from = bands;
       for (std::size_t b = 0; b < bands; ++b) {
@@ -209,8 +210,19 @@ void LightingTracker::show(std::span<const Rgb> target, int index) {
   shown_[k] = target[k];
 }
 
-const LightingUpdate& LightingTracker::advance(std::span<const Rgb> wanted) {
+const LightingUpdate& LightingTracker::advance(std::span<const Rgb> target) {
+  return advance(target, nullptr);
+}
+
+const LightingUpdate& LightingTracker::advance(std::span<const Rgb> target, UpdateLimit& limit) {
+  return advance(target, &limit);
+}
+
+const LightingUpdate& LightingTracker::advance(std::span<const Rgb> wanted, UpdateLimit* limit) {
   const std::span<const Rgb> target = take_in(wanted);
+  // How many the limit will take is not known yet: about as many as it took before.
+  const int expected =
+      limit ? std::clamp(static_cast<int>(update_.deltas.size()), 1, kMostExpected) : options_.wavelets;
   update_.reset.reset();
   update_.deltas.clear();
 
@@ -229,7 +241,7 @@ const LightingUpdate& LightingTracker::advance(std::span<const Rgb> wanted) {
     for (std::size_t b = 0; b < bands; ++b) update_.reset[b] = true;
   } else if (options_.method == LightingMethod::pbi) {
     update_.reset = options_.band_choice == BandChoice::simple ? choose_bands_simply()
-                                                               : choose_bands_exhaustively();
+                                                               : choose_bands_exhaustively(expected);
   }
 
   // Forget the reset bands (line 14) and pick wavelets over all bands together (line 3).
@@ -242,7 +254,19 @@ const LightingUpdate& LightingTracker::advance(std::span<const Rgb> wanted) {
       std::fill(emitted_.begin() + range.begin, emitted_.begin() + range.end, RgbD{});
     }
   }
-  top_k_.select(key_, options_.wavelets, chosen_);
+  if (limit) {
+    chosen_.clear();
+    limit->begin(target, shown_, update_.reset);
+    ranked_.start(key_);
+    for (int index = ranked_.next(); index >= 0; index = ranked_.next()) {
+      const auto k = static_cast<std::size_t>(index);
+      if (!limit->take(index, target[k] - shown_[k])) break;
+      chosen_.push_back(index);
+    }
+    std::sort(chosen_.begin(), chosen_.end());
+  } else {
+    top_k_.select(key_, options_.wavelets, chosen_);
+  }
 
   // Bring the chosen ones up to date (lines 8-11 and 15-18; Eqs. 5 and 6).
   for (int index : chosen_) show(target, index);

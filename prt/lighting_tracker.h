@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "prt/lighting_update.h"
+#include "prt/update_limit.h"
 #include "wavelet/haar.h"
 #include "wavelet/top_k.h"
 
@@ -68,6 +69,10 @@ class LightingTracker {
   /// was. Magnitudes below 2^-100 are taken as zero. O(size()); no heap use once warm.
   const LightingUpdate& advance(std::span<const Rgb> target);
 
+  /// The same, with as many wavelets as `limit` takes instead of options().wavelets. The first n of
+  /// the ranking are those that advance() chooses for wavelets = n (and simple band choice).
+  const LightingUpdate& advance(std::span<const Rgb> target, UpdateLimit& limit);
+
   /// Shows `target` in full, as at the start of a sequence (Overbeck 2006, section 3, sets
   /// L~0 = L0): every band reset, every non-zero coefficient in the update. Same errors.
   const LightingUpdate& start_exact(std::span<const Rgb> target);
@@ -81,10 +86,11 @@ class LightingTracker {
   std::span<const Rgb> shown() const { return shown_; }
 
  private:
+  const LightingUpdate& advance(std::span<const Rgb> target, UpdateLimit* limit);
   std::span<const Rgb> take_in(std::span<const Rgb> target);
   void rank(std::span<const Rgb> target);
   BandMask choose_bands_simply() const;
-  BandMask choose_bands_exhaustively();
+  BandMask choose_bands_exhaustively(int wavelets);
   void show(std::span<const Rgb> target, int index);
 
   HaarLayout layout_;
@@ -102,6 +108,7 @@ class LightingTracker {
   std::vector<float> key_;  // of the choice made
   std::vector<int> chosen_;
   TopK top_k_;
+  RankedKeys ranked_;
   std::vector<std::vector<float>> sorted_keys_;  // exhaustive: [band * 2 + choice], descending
   std::vector<int> band_chosen_;
 };

@@ -21,6 +21,7 @@ class MeshRelighter {
   RelightStats apply(const LightingUpdate& update);
   /// See RowSums::expect_resets.
   void expect_resets(bool expected) { sums_.expect_resets(expected); }
+  const RowSums& sums() const { return sums_; }
   /// One an output, W m^-2 sr^-1: vertex * terms + term, so one a vertex where terms is 1.
   std::span<const Rgb> radiance() const { return radiance_; }
   const Transport& transport() const { return sums_.transport(); }

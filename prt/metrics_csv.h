@@ -12,7 +12,7 @@ namespace haarlight {
 
 /// The names of the columns, without a newline:
 /// frame,method,wavelets,weight,updates,resets,lighting_error,image_rel_rmse,image_max_abs,
-/// update_ms,apply_ms,finish_ms,total_ms,bytes
+/// update_ms,apply_ms,finish_ms,total_ms,bytes,flicker,error_estimate,error_bound,transport_error
 std::string metrics_csv_header();
 
 /// One row, without a newline. Fields that were not measured are empty. Errors carry nine

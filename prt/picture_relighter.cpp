@@ -128,4 +128,33 @@ const Transport& PictureRelighter::transport() const {
   return state_->image ? state_->image->transport() : state_->vertices->transport();
 }
 
+void PictureRelighter::vertex_weights(std::vector<float>& weights) const {
+  weights.clear();
+  if (state_->image) return;
+  const TransportMesh& mesh = *state_->vertices->transport().info().mesh;
+  weights.resize(mesh.position.size());
+  const Camera& camera = state_->camera;
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
+      const float covered = state_->drawing->coverage()[state_->picture.index(x, y)];
+      for (const MeshPicture::Fragment& f : state_->drawing->fragments(x, y)) {
+        const auto& corner = mesh.triangle[f.triangle];
+        weights[corner[0]] += covered * (f.share - f.second - f.third);
+        weights[corner[1]] += covered * f.second;
+        weights[corner[2]] += covered * f.third;
+      }
+    }
+  }
+}
+
+double PictureRelighter::reset_bytes(int band) const {
+  const RowSums& sums = state_->image ? state_->image->sums() : state_->vertices->sums();
+  return static_cast<double>(sums.reset_bytes(band));
+}
+
+double PictureRelighter::fold_bytes() const {
+  const RowSums& sums = state_->image ? state_->image->sums() : state_->vertices->sums();
+  return static_cast<double>(sums.fold_bytes());
+}
+
 }  // namespace haarlight

@@ -27,6 +27,10 @@ class PictureRelighter final : public Relighter {
   const Image& picture() const override;
   std::span<const float> coverage() const override;
   const Transport& transport() const override;
+  bool shows_rows() const override { return true; }
+  void vertex_weights(std::vector<float>& weights) const override;
+  double reset_bytes(int band) const override;
+  double fold_bytes() const override;
 
  private:
   struct State;

@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "core/camera.h"
 #include "core/image.h"
@@ -41,6 +42,16 @@ class Relighter {
   /// Share of each pixel that the scene covers.
   virtual std::span<const float> coverage() const = 0;
   virtual const Transport& transport() const = 0;
+
+  /// Whether a pixel is a row of T, or a mean of rows that are vertices, so that ErrorEstimator can
+  /// judge the picture. If so, of a mesh: the sum over the picture's pixels of each vertex's weight
+  /// times coverage, as last drawn.
+  virtual bool shows_rows() const { return false; }
+  virtual void vertex_weights(std::vector<float>& weights) const { weights.clear(); }
+  /// What the next apply() would move beside its columns, in bytes: to take back a band, and in any
+  /// case. See RowSums::reset_bytes and fold_bytes.
+  virtual double reset_bytes(int band) const { return static_cast<void>(band), 0.0; }
+  virtual double fold_bytes() const { return 0; }
 
  protected:
   Relighter() = default;

@@ -124,6 +124,16 @@ struct RowSums::State {
     logged[j] += delta.delta;
   }
 
+  // The band with the longest log that is to be folded; null if none is.
+  Band* to_fold() {
+    Band* longest = nullptr;
+    for (Band& b : band) {
+      const std::uint64_t least = longest ? longest->log_bytes : kFoldPictures * picture_bytes();
+      if (expect_resets && b.log_bytes > least) longest = &b;
+    }
+    return longest;
+  }
+
   void clear_log(Band& b) {
     for (int index : b.log) {
       logged[static_cast<std::size_t>(index)] = {};
@@ -202,6 +212,11 @@ ApplyStats RowSums::apply(const LightingUpdate& update, const ChunkDone& done) {
   }
   from_zero |= !lit;
 
+  State::Band* longest = from_zero || update.empty() ? nullptr : s.to_fold();
+  if (longest && !update.reset[static_cast<std::size_t>(longest - s.band.data())]) {
+    s.fold(*longest, stats);
+  }
+
   // Gather the columns to stream: what reset bands logged, taken back, and the update's deltas.
   std::array<const double*, HaarLayout::kMaxBands> taken_back{};
   std::size_t taken_back_count = 0;
@@ -255,7 +270,7 @@ ApplyStats RowSums::apply(const LightingUpdate& update, const ChunkDone& done) {
   for (const WaveletDelta& column : s.columns_scratch) {
     stats.transport_bytes += s.bytes_of[static_cast<std::size_t>(column.index)];
   }
-  stats.columns = static_cast<int>(s.columns_scratch.size());
+  stats.columns += static_cast<int>(s.columns_scratch.size());
   std::atomic<std::uint64_t> prepared{0};  // chunk passes over sums, to clear or take back
   stats.sum_bytes += s.stream(
       s.columns_scratch, s.totals,
@@ -280,15 +295,25 @@ ApplyStats RowSums::apply(const LightingUpdate& update, const ChunkDone& done) {
       done);
   stats.sum_bytes += prepared.load() * kChunkTotals * sizeof(double);
 
-  if (s.expect_resets) {
-    for (std::size_t b = 0; b < bands; ++b) {
-      if (s.band[b].log_bytes > kFoldPictures * s.picture_bytes()) s.fold(s.band[b], stats);
-    }
+  // A picture that starts anew with all of its light has long logs, and time: frames after it not.
+  if (from_zero) {
+    while (State::Band* band = s.to_fold()) s.fold(*band, stats);
   }
   return stats;
 }
 
 void RowSums::expect_resets(bool expected) { state_->expect_resets = expected; }
+
+std::uint64_t RowSums::reset_bytes(int band) const {
+  const State::Band& b = state_->band[static_cast<std::size_t>(band)];
+  return b.log_bytes + (b.kept_lit ? 3 * state_->picture_bytes() : 0);
+}
+
+std::uint64_t RowSums::fold_bytes() const {
+  const State::Band* longest = state_->to_fold();
+  // The log, and the kept picture read and written.
+  return longest ? longest->log_bytes + 2 * state_->picture_bytes() : 0;
+}
 
 const Transport& RowSums::transport() const { return state_->transport; }
 std::span<const double> RowSums::totals() const { return state_->totals; }

@@ -25,7 +25,8 @@ struct ApplyStats {
 /// columns, so here only the total is kept up to date, beside a log per band of what was added
 /// since the band was last empty (or last folded). A reset takes the logged columns back; a log
 /// that has grown past a few pictures' worth of bytes is folded into a kept picture of the band,
-/// once, so that a later reset subtracts that instead. Bands that never reset need no picture.
+/// once, so that a later reset subtracts that instead. Bands that never reset need no picture. One
+/// band is folded in a frame, at its beginning and only if it is not reset by it.
 ///
 /// Accuracy: |total - T shown| <= (K + 2n) 2^-53 S, K the updates since the sums were last empty,
 /// n the terms of one sum, S the largest sum |T| |shown| met. When nothing is shown the total is +0
@@ -49,6 +50,11 @@ class RowSums {
   /// Whether single bands will be reset (true from the start). A caller whose bands never are (bi,
   /// reference) says no, and no band's log is folded: no kept pictures, and no time for them.
   void expect_resets(bool expected);
+
+  /// Traffic of the next update beside its columns, in bytes: what taking back band `band` would
+  /// stream, and what a long log asks for unless its band is reset.
+  std::uint64_t reset_bytes(int band) const;
+  std::uint64_t fold_bytes() const;
 
   const Transport& transport() const;
   /// All totals: rows() * 3 values, [block][channel][row of block].

@@ -1,4 +1,4 @@
-// The k largest of many keys, with a total order so that ties never depend on luck.
+// The largest of many keys, with a total order so that ties never depend on luck.
 
 #pragma once
 
@@ -18,6 +18,19 @@ class TopK {
 
  private:
   std::vector<std::uint64_t> packed_;
+};
+
+/// The same order one by one, for when it is not known before how many are wanted. Sorts as far as
+/// it is asked. Keeps its scratch, so no heap use once warm.
+class RankedKeys {
+ public:
+  void start(std::span<const float> keys);
+  /// Index of the next key, or -1 after the last positive one.
+  int next();
+
+ private:
+  std::vector<std::uint64_t> packed_;  // descending up to sorted_
+  std::size_t next_ = 0, sorted_ = 0;
 };
 
 }  // namespace haarlight

@@ -34,23 +34,33 @@ FrameMetrics measured() {
   m.finish_ms = 0.0625;
   m.total_ms = 2;
   m.bytes = 12345678901;
+  m.flicker = 0.25;
+  m.error_estimate = 0.0625;
+  m.error_bound = 2;
+  m.transport_error = 0.01;
   return m;
 }
 
 TEST(MetricsCsv, HeaderNamesTheColumns) {
   EXPECT_EQ(metrics_csv_header(),
             "frame,method,wavelets,weight,updates,resets,lighting_error,image_rel_rmse,"
-            "image_max_abs,update_ms,apply_ms,finish_ms,total_ms,bytes");
+            "image_max_abs,update_ms,apply_ms,finish_ms,total_ms,bytes,flicker,error_estimate,error_bound,"
+            "transport_error");
 }
 
 TEST(MetricsCsv, RowsHoldWhatWasMeasuredAndNothingElse) {
   FrameMetrics m = measured();
   EXPECT_EQ(metrics_csv_row(m),
-            "30,bi,60,transport,59,010010,0.125,0.5,1e-07,0.2500,1.5000,0.0625,2.0000,12345678901");
+            "30,bi,60,transport,59,010010,0.125,0.5,1e-07,0.2500,1.5000,0.0625,2.0000,12345678901,"
+            "0.25,0.0625,2,0.01");
   m.image_rel_rmse.reset();
   m.image_max_abs.reset();
+  m.flicker.reset();
+  m.error_estimate.reset();
+  m.error_bound.reset();
+  m.transport_error.reset();
   EXPECT_EQ(metrics_csv_row(m),
-            "30,bi,60,transport,59,010010,0.125,,,0.2500,1.5000,0.0625,2.0000,12345678901");
+            "30,bi,60,transport,59,010010,0.125,,,0.2500,1.5000,0.0625,2.0000,12345678901,,,,");
 }
 
 TEST(MetricsCsv, ErrorsSurviveAsFloats) {

@@ -1,0 +1,223 @@
+// Sketches and norms of columns, times the lighting that is left out.
+
+#include "prt/error_estimator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/error.h"
+#include "core/parallel.h"
+#include "core/simd.h"
+
+namespace haarlight {
+namespace {
+
+constexpr std::size_t kLanes = ErrorTables::kLanes;
+constexpr std::size_t kSketch = ErrorTables::kSketch;
+constexpr int kColumnsOfSlice = 256;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// A slice's sums of up to 256 floats, none negative, each product rounded: 257 x 2^-24 < 2e-5.
+constexpr double kSumRounding = 1 + 2e-5;
+// Sums of a table: 256 floats a lane and chunk, 2e-5 of what they would be without signs, which is
+// at most the norm times the root of their number.
+constexpr double kTableRounding = 2e-5;
+// Rounding of finished pixels, of either picture and relative to it: two float operations for a
+// pixel; a dozen, on values that may cancel in differences of corners, for one of a mesh.
+constexpr double kPixelRounding = 2 * 0x1p-24, kMeshPixelRounding = 64 * 0x1p-24;
+
+// out[channel][lane] += a[channel][lane] * x[channel], for a row of groups.
+HAARLIGHT_MULTIVERSION void add_sketch(const float* column, const float* x, std::size_t groups,
+                                       float* out) {
+  for (std::size_t g = 0; g < groups; ++g) {
+    for (std::size_t ch = 0; ch < 3; ++ch) {
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        const std::size_t k = g * kSketch + ch * kLanes + i;
+        out[k] += column[k] * x[ch];
+      }
+    }
+  }
+}
+
+double squared(double x) { return x * x; }
+
+}  // namespace
+
+struct ErrorEstimator::Slice {
+  std::vector<float> change, target;              // sketches
+  std::vector<float> change_bound, target_bound;  // [group][channel]
+  std::vector<double> target_sum;
+};
+
+bool ErrorEstimator::fits(const Transport& transport) { return transport.info().terms == 1; }
+
+ErrorEstimator::ErrorEstimator(const Transport& transport) {
+  if (!fits(transport)) {
+    throw Error(ErrorKind::invalid_argument,
+                "the transport has several terms an output, expected one: its picture's error "
+                "cannot be estimated");
+  }
+  tables_ = std::make_shared<const ErrorTables>(transport);
+  mesh_ = transport.kind() == TransportKind::mesh;
+  const ErrorTables& t = *tables_;
+  if (mesh_) row_output_.assign(transport.row_output().begin(), transport.row_output().end());
+  view_mean_.assign(t.sketch_groups, 1.0);
+  view_most_.assign(t.norm_groups, 1.0);
+  change_.resize(t.sketch_groups * kSketch);
+  target_.resize(t.sketch_groups * kSketch);
+  change_bound_.resize(3 * t.norm_groups);
+  target_bound_.resize(3 * t.norm_groups);
+  target_sum_.resize(3 * t.norm_groups);
+  const int slices = (transport.layout().size() + kColumnsOfSlice - 1) / kColumnsOfSlice;
+  slices_.resize(static_cast<std::size_t>(slices));
+  for (Slice& s : slices_) {
+    s.change.resize(change_.size());
+    s.target.resize(target_.size());
+    s.change_bound.resize(change_bound_.size());
+    s.target_bound.resize(target_bound_.size());
+    s.target_sum.resize(target_sum_.size());
+  }
+}
+
+// A pixel's error is at most that of its vertices, each by its share of the picture. Weighted rows
+// hold root(area) x error; what is missing is the share over the area: on average for the estimate,
+// at most for the bound.
+void ErrorEstimator::set_vertex_weights(std::span<const float> weights) {
+  if (!mesh_) return;
+  const ErrorTables& t = *tables_;
+  std::vector<double> share(t.sketch_groups), area(t.sketch_groups);
+  std::fill(view_most_.begin(), view_most_.end(), 0.0);
+  for (std::size_t row = 0; row < row_output_.size(); ++row) {
+    if (row_output_[row] == kNoOutput) continue;
+    const int chunk = static_cast<int>(row / kChunkRows);
+    const auto w = static_cast<double>(weights[row_output_[row]]);
+    const double a = squared(static_cast<double>(t.row_weight[row]));
+    share[t.sketch_group(chunk)] += w;
+    area[t.sketch_group(chunk)] += a;
+    if (w > 0) {
+      double& most = view_most_[t.norm_group(chunk)];
+      most = std::max(most, a > 0 ? w / a : kInfinity);
+    }
+  }
+  for (std::size_t g = 0; g < share.size(); ++g) view_mean_[g] = area[g] > 0 ? share[g] / area[g] : 0;
+  calibration_ = 1;
+}
+
+void ErrorEstimator::sum_up(std::span<const Rgb> target, std::span<const Rgb> shown,
+                            bool with_bound) {
+  const ErrorTables& t = *tables_;
+  parallel_for(static_cast<int>(slices_.size()), [&](int slice) {
+    Slice& s = slices_[static_cast<std::size_t>(slice)];
+    for (auto* sums : {&s.change, &s.target, &s.change_bound, &s.target_bound}) {
+      std::fill(sums->begin(), sums->end(), 0.0f);
+    }
+    std::fill(s.target_sum.begin(), s.target_sum.end(), 0.0);
+    const auto begin = static_cast<std::size_t>(slice) * kColumnsOfSlice;
+    const std::size_t end = std::min(begin + kColumnsOfSlice, target.size());
+    for (std::size_t j = begin; j < end; ++j) {
+      const Rgb d = target[j] - shown[j];
+      const float change[3] = {d.r, d.g, d.b};
+      const float light[3] = {target[j].r, target[j].g, target[j].b};
+      const bool lit = !(target[j] == Rgb{}), changed = !(target[j] == shown[j]);
+      if (!lit && !changed) continue;
+      const float* column = t.sketch.data() + j * t.sketch_groups * kSketch;
+      if (changed) add_sketch(column, change, t.sketch_groups, s.change.data());
+      if (lit) add_sketch(column, light, t.sketch_groups, s.target.data());
+      if (!with_bound) continue;
+      const float* norm = t.norm.data() + j * t.norm_groups * 3;
+      const float* sum = t.sum.data() + j * t.norm_groups * 3;
+      for (std::size_t k = 0; k < 3 * t.norm_groups; ++k) {
+        s.change_bound[k] += std::abs(change[k % 3]) * norm[k];
+        s.target_bound[k] += std::abs(light[k % 3]) * norm[k];
+        s.target_sum[k] += static_cast<double>(light[k % 3]) * static_cast<double>(sum[k]);
+      }
+    }
+  });
+  for (auto* sums : {&change_, &target_, &change_bound_, &target_bound_, &target_sum_}) {
+    std::fill(sums->begin(), sums->end(), 0.0);
+  }
+  const auto add = [](const auto& from, std::vector<double>& to) {
+    for (std::size_t i = 0; i < to.size(); ++i) to[i] += static_cast<double>(from[i]);
+  };
+  for (const Slice& s : slices_) {
+    add(s.change, change_);
+    add(s.target, target_);
+    if (!with_bound) continue;
+    add(s.change_bound, change_bound_);
+    add(s.target_bound, target_bound_);
+    add(s.target_sum, target_sum_);
+  }
+}
+
+double ErrorEstimator::weighted(const std::vector<double>& sketch) const {
+  double sum = 0;
+  for (std::size_t g = 0; g < view_mean_.size(); ++g) {
+    double group = 0;
+    for (std::size_t i = 0; i < kSketch; ++i) group += squared(sketch[g * kSketch + i]);
+    sum += view_mean_[g] * group;
+  }
+  return std::sqrt(sum);
+}
+
+double ErrorEstimator::estimate() const {
+  const double change = weighted(change_);
+  if (change == 0) return 0;
+  const double target = calibration_ * weighted(target_);
+  return target > 0 ? change / target : kInfinity;
+}
+
+void ErrorEstimator::begin(std::span<const Rgb> target, std::span<const Rgb> shown) {
+  sum_up(target, shown, false);
+}
+
+void ErrorEstimator::take(int index, const Rgb& difference) {
+  const ErrorTables& t = *tables_;
+  const float* column =
+      t.sketch.data() + static_cast<std::size_t>(index) * t.sketch_groups * kSketch;
+  const float x[3] = {difference.r, difference.g, difference.b};
+  for (std::size_t k = 0; k < change_.size(); ++k) {
+    change_[k] -= static_cast<double>(column[k] * x[k / kLanes % 3]);
+  }
+}
+
+PictureErrorGuess ErrorEstimator::judge(std::span<const Rgb> target, std::span<const Rgb> shown,
+                                        double picture_norm) {
+  sum_up(target, shown, true);
+  PictureErrorGuess guess;
+  guess.estimate = estimate();
+
+  // How far the sketch is off for what is shown, which is known: kept for the next frame.
+  std::vector<double>& of_shown = target_;
+  for (std::size_t k = 0; k < of_shown.size(); ++k) of_shown[k] -= change_[k];
+  const double sketched = weighted(of_shown);
+  if (sketched > 0 && picture_norm > 0) calibration_ = picture_norm / sketched;
+
+  // The largest that the difference, the least that the exact picture can be.
+  const ErrorTables& t = *tables_;
+  double most = 0, by_means = 0;
+  for (std::size_t g = 0; g < t.norm_groups; ++g) {
+    for (std::size_t ch = 0; ch < 3; ++ch) {
+      const std::size_t k = 3 * g + ch;
+      if (change_bound_[k] > 0) most += view_most_[g] * squared(kSumRounding * change_bound_[k]);
+      if (mesh_ || t.group_rows[g] == 0) continue;
+      const double rows = static_cast<double>(t.group_rows[g]);
+      const double slack = kTableRounding * std::sqrt(rows) * kSumRounding * target_bound_[k];
+      by_means += squared(std::max(0.0, std::abs(target_sum_[k]) - slack)) / rows;
+    }
+  }
+  most = std::sqrt(most);
+  const double rounding = mesh_ ? kMeshPixelRounding : kPixelRounding;
+  const double least =
+      std::max(std::sqrt(by_means), picture_norm * (1 - rounding) - most) * (1 - rounding);
+  if (most == 0 && picture_norm == 0) {
+    guess.bound = 0;
+  } else if (!(least > 0)) {
+    guess.bound = kInfinity;
+  } else {
+    guess.bound = (most + rounding * (picture_norm + least + most)) / least;
+  }
+  return guess;
+}
+
+}  // namespace haarlight

@@ -1,0 +1,29 @@
+// As few wavelets as keep the estimated error of the picture small enough.
+
+#pragma once
+
+#include "prt/error_estimator.h"
+#include "prt/update_limit.h"
+
+namespace haarlight {
+
+class ErrorLimit final : public UpdateLimit {
+ public:
+  /// Takes wavelets until estimator.estimate() is at most `error`. The estimator must outlive it.
+  ErrorLimit(ErrorEstimator& estimator, double error) : estimator_(estimator), error_(error) {}
+
+  void begin(std::span<const Rgb> target, std::span<const Rgb> shown, const BandMask&) override {
+    estimator_.begin(target, shown);
+  }
+  bool take(int index, const Rgb& difference) override {
+    if (estimator_.estimate() <= error_) return false;
+    estimator_.take(index, difference);
+    return true;
+  }
+
+ private:
+  ErrorEstimator& estimator_;
+  double error_;
+};
+
+}  // namespace haarlight

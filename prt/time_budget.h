@@ -1,0 +1,76 @@
+// As many wavelets as a frame's time allows, on this machine, as it is now.
+
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "prt/update_limit.h"
+#include "wavelet/haar.h"
+
+namespace haarlight {
+
+/// A frame beyond deciding takes fixed + per_byte * bytes, bytes of columns to stream and of bands
+/// to take back, which are known before. Both numbers are fitted to the frames that were measured,
+/// the last fifty or so; where bytes vary too little to tell them apart, half of the time is taken
+/// as fixed.
+class FrameTimeModel {
+ public:
+  /// A frame that had `bytes` to move took `milliseconds`.
+  void add(double bytes, double milliseconds);
+  double predict(double bytes) const { return fixed_ + per_byte_ * bytes; }
+  /// The most bytes that are predicted to take at most so long; 0 if none.
+  double bytes_within(double milliseconds) const;
+
+ private:
+  double weight_ = 0, bytes_ = 0, time_ = 0, bytes_bytes_ = 0, bytes_time_ = 0;
+  double fixed_ = 0, per_byte_ = 1e-3 / 4e6;  // 4 GB/s, until something is known
+};
+
+/// Ends updates so that frames stay within a time. It aims below the time by as much as frames have
+/// been slower than predicted lately: of the last 200, all but two must have stayed within 1.1
+/// times the time asked for.
+class TimeBudget final : public UpdateLimit {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  /// Bytes of each coefficient's column.
+  explicit TimeBudget(std::vector<double> column_bytes);
+
+  /// A frame begins, now, that is to take `milliseconds`. `reset_bytes` of each band and
+  /// `fixed_bytes` are what it would move beside columns.
+  void start(double milliseconds, Clock::time_point now, std::span<const double> reset_bytes,
+             double fixed_bytes);
+  /// It took so long, deciding and all.
+  void finish(double milliseconds);
+
+  void begin(std::span<const Rgb> target, std::span<const Rgb> shown,
+             const BandMask& reset) override;
+  bool take(int index, const Rgb& difference) override;
+
+  /// Time that deciding of this frame may be trusted to have taken before begin(): for tests.
+  void set_clock(Clock::time_point (*now)()) { now_ = now; }
+
+ private:
+  double aim() const;
+
+  std::vector<double> column_bytes_;
+  FrameTimeModel model_;
+  Clock::time_point (*now_)() = &Clock::now;
+  std::array<double, HaarLayout::kMaxBands> reset_bytes_{};
+
+  // Of the frame.
+  double wanted_ = 0, fixed_bytes_ = 0, begun_ms_ = 0, moved_ = 0, allowed_ = 0;
+  Clock::time_point started_;
+  bool any_ = false;
+
+  double most_moved_ = 0;  // of frames so far: growth is at most twofold
+  std::vector<double> slower_;  // measured over predicted time, of the last frames, as a ring
+  std::size_t next_slower_ = 0;
+  mutable std::vector<double> sorted_;
+};
+
+}  // namespace haarlight

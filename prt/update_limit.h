@@ -1,0 +1,24 @@
+// What ends an update other than a number of wavelets: time, or an error that is small enough.
+
+#pragma once
+
+#include <span>
+
+#include "core/rgb.h"
+#include "prt/lighting_update.h"
+
+namespace haarlight {
+
+/// Asked by LightingTracker while it decides, wavelet by wavelet, in the order of their ranks.
+class UpdateLimit {
+ public:
+  virtual ~UpdateLimit() = default;
+  /// The bands to reset are chosen; `shown` is what is left without them. Both lightings are valid
+  /// until the update is decided.
+  virtual void begin(std::span<const Rgb> target, std::span<const Rgb> shown,
+                     const BandMask& reset) = 0;
+  /// Whether the next wavelet is to be changed, by `difference`; after a no it is not asked again.
+  virtual bool take(int index, const Rgb& difference) = 0;
+};
+
+}  // namespace haarlight
