@@ -33,6 +33,7 @@ namespace {
 constexpr int kMaxFrames = 1'000'000;
 constexpr double kMaxDegrees = 1e6;
 constexpr double kMaxExposure = 64;
+constexpr double kLeastMilliseconds = 0.01, kMostMilliseconds = 1e6, kLeastError = 1e-6;
 const std::vector<std::string> kFormats{"exr", "png"};
 
 struct RelightCommand {
@@ -252,6 +253,32 @@ Verb add_relight(CLI::App& verb) {
   add_integer(verb, "--wavelets", s.lighting.wavelets, 1, 6 * 1024 * 1024,
               "most wavelets changed in a frame")
       ->group("Method");
+  CLI::Option* budget_ms =
+      verb.add_option_function<std::string>(
+              "--budget-ms",
+              [&s](const std::string& text) {
+                s.budget = {
+                    BudgetKind::milliseconds,
+                    parse_number("--budget-ms", text, kLeastMilliseconds, kMostMilliseconds)};
+              },
+              fmt::format("as many wavelets as keep a frame within so many milliseconds, {} to {}, "
+                          "instead of --wavelets",
+                          kLeastMilliseconds, kMostMilliseconds))
+          ->type_name("T")
+          ->excludes("--wavelets")
+          ->group("Method");
+  verb.add_option_function<std::string>(
+          "--target-error",
+          [&s](const std::string& text) {
+            s.budget = {BudgetKind::error, parse_number("--target-error", text, kLeastError, 1)};
+          },
+          fmt::format("as few wavelets as keep the estimated relative error of the picture at or "
+                      "below this, {} to 1, instead of --wavelets",
+                      kLeastError))
+      ->type_name("E")
+      ->excludes("--wavelets")
+      ->excludes(budget_ms)
+      ->group("Method");
   add_choice<WaveletWeight>(verb, "--weight", s.weight,
                             {{"none", WaveletWeight::none},
                              {"area", WaveletWeight::area},
@@ -333,12 +360,14 @@ Verb add_relight(CLI::App& verb) {
            "one row a frame; without -o no pictures are written")
       ->group("Output");
   verb.add_flag("--against-reference", s.against_reference,
-                "also relight exactly, and fill the columns image_rel_rmse and image_max_abs")
+                "also relight exactly, and fill the columns image_rel_rmse, image_max_abs and "
+                "flicker")
       ->group("Output");
   add_threads(verb)->group("Output");
 
-  for (const char* name : {"--degrees", "--frames", "--stop", "--method", "--wavelets", "--weight",
-                           "--bands", "--from-dark", "--orbit", "--size"}) {
+  for (const char* name :
+       {"--degrees", "--frames", "--stop", "--method", "--wavelets", "--weight", "--bands",
+        "--from-dark", "--orbit", "--size", "--budget-ms", "--target-error"}) {
     c.said_by_recording.push_back(verb.get_option(name));
   }
 
@@ -353,7 +382,10 @@ Verb add_relight(CLI::App& verb) {
       "first),\n"
       "lighting_error (area-weighted L1, relative), image_rel_rmse and image_max_abs (against the\n"
       "exact picture, scene only), update_ms, apply_ms, finish_ms, total_ms, bytes (memory "
-      "traffic).\n"
+      "traffic),\n"
+      "flicker (RMS of the change since the frame before against the exact picture's, relative),\n"
+      "error_estimate and error_bound (of image_rel_rmse, from the lighting left out),\n"
+      "transport_error (what the file's compression cost, measured when it was made).\n"
       "\nExamples:\n"
       "  haarlight relight bunny.hlt --env lobby.exr --method pbi --wavelets 30 \\\n"
       "      --metrics m.csv --against-reference -o out/bunny --every 10\n"

@@ -12,7 +12,8 @@ namespace haarlight {
 std::string incomplete_note(const std::string& meta);
 
 /// The measured_error of a transport's description (TransportInfo::meta): relative RMS of its
-/// picture against what was traced, under the worst of the built-in lightings. None if it says none.
+/// picture against what was traced, under the worst of the built-in lightings. None if it says
+/// none.
 std::optional<double> measured_error(const std::string& meta);
 
 }  // namespace haarlight

@@ -13,8 +13,6 @@
 namespace haarlight {
 namespace {
 
-constexpr std::size_t kLanes = ErrorTables::kLanes;
-constexpr std::size_t kSketch = ErrorTables::kSketch;
 constexpr int kColumnsOfSlice = 256;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -27,15 +25,13 @@ constexpr double kTableRounding = 2e-5;
 // pixel; a dozen, on values that may cancel in differences of corners, for one of a mesh.
 constexpr double kPixelRounding = 2 * 0x1p-24, kMeshPixelRounding = 64 * 0x1p-24;
 
-// out[channel][lane] += a[channel][lane] * x[channel], for a row of groups.
-HAARLIGHT_MULTIVERSION void add_sketch(const float* column, const float* x, std::size_t groups,
-                                       float* out) {
-  for (std::size_t g = 0; g < groups; ++g) {
+// out[group][channel][lane] += column[group][channel][lane] * x[channel].
+HAARLIGHT_MULTIVERSION void add_sketch(const float* column, const float* x, std::size_t lanes,
+                                       std::size_t size, float* out) {
+  for (std::size_t first = 0; first < size; first += 3 * lanes) {
     for (std::size_t ch = 0; ch < 3; ++ch) {
-      for (std::size_t i = 0; i < kLanes; ++i) {
-        const std::size_t k = g * kSketch + ch * kLanes + i;
-        out[k] += column[k] * x[ch];
-      }
+      const std::size_t at = first + ch * lanes;
+      for (std::size_t i = 0; i < lanes; ++i) out[at + i] += column[at + i] * x[ch];
     }
   }
 }
@@ -43,12 +39,6 @@ HAARLIGHT_MULTIVERSION void add_sketch(const float* column, const float* x, std:
 double squared(double x) { return x * x; }
 
 }  // namespace
-
-struct ErrorEstimator::Slice {
-  std::vector<float> change, target;              // sketches
-  std::vector<float> change_bound, target_bound;  // [group][channel]
-  std::vector<double> target_sum;
-};
 
 bool ErrorEstimator::fits(const Transport& transport) { return transport.info().terms == 1; }
 
@@ -63,12 +53,12 @@ ErrorEstimator::ErrorEstimator(const Transport& transport) {
   const ErrorTables& t = *tables_;
   if (mesh_) row_output_.assign(transport.row_output().begin(), transport.row_output().end());
   view_mean_.assign(t.sketch_groups, 1.0);
-  view_most_.assign(t.norm_groups, 1.0);
-  change_.resize(t.sketch_groups * kSketch);
-  target_.resize(t.sketch_groups * kSketch);
-  change_bound_.resize(3 * t.norm_groups);
-  target_bound_.resize(3 * t.norm_groups);
-  target_sum_.resize(3 * t.norm_groups);
+  view_most_.assign(t.groups, 1.0);
+  change_.resize(t.sketch_size());
+  target_.resize(t.sketch_size());
+  change_bound_.resize(3 * t.groups);
+  target_bound_.resize(3 * t.groups);
+  target_sum_.resize(3 * t.groups);
   const int slices = (transport.layout().size() + kColumnsOfSlice - 1) / kColumnsOfSlice;
   slices_.resize(static_cast<std::size_t>(slices));
   for (Slice& s : slices_) {
@@ -81,26 +71,23 @@ ErrorEstimator::ErrorEstimator(const Transport& transport) {
 }
 
 // A pixel's error is at most that of its vertices, each by its share of the picture. Weighted rows
-// hold root(area) x error; what is missing is the share over the area: on average for the estimate,
-// at most for the bound.
+// hold root(area) x error; what is missing is the share over the area: on average over a group for
+// the estimate, at most for the bound.
 void ErrorEstimator::set_vertex_weights(std::span<const float> weights) {
   if (!mesh_) return;
   const ErrorTables& t = *tables_;
-  std::vector<double> share(t.sketch_groups), area(t.sketch_groups);
+  std::vector<double> share(t.groups), area(t.groups);
   std::fill(view_most_.begin(), view_most_.end(), 0.0);
   for (std::size_t row = 0; row < row_output_.size(); ++row) {
     if (row_output_[row] == kNoOutput) continue;
-    const int chunk = static_cast<int>(row / kChunkRows);
+    const std::size_t g = t.group_of_row(row);
     const auto w = static_cast<double>(weights[row_output_[row]]);
-    const double a = squared(static_cast<double>(t.row_weight[row]));
-    share[t.sketch_group(chunk)] += w;
-    area[t.sketch_group(chunk)] += a;
-    if (w > 0) {
-      double& most = view_most_[t.norm_group(chunk)];
-      most = std::max(most, a > 0 ? w / a : kInfinity);
-    }
+    const auto a = static_cast<double>(t.area[row]);
+    share[g] += w;
+    area[g] += a;
+    view_most_[g] = std::max(view_most_[g], w / (a + 1));
   }
-  for (std::size_t g = 0; g < share.size(); ++g) view_mean_[g] = area[g] > 0 ? share[g] / area[g] : 0;
+  for (std::size_t g = 0; g < t.groups; ++g) view_mean_[g] = area[g] > 0 ? share[g] / area[g] : 0;
   calibration_ = 1;
 }
 
@@ -121,13 +108,13 @@ void ErrorEstimator::sum_up(std::span<const Rgb> target, std::span<const Rgb> sh
       const float light[3] = {target[j].r, target[j].g, target[j].b};
       const bool lit = !(target[j] == Rgb{}), changed = !(target[j] == shown[j]);
       if (!lit && !changed) continue;
-      const float* column = t.sketch.data() + j * t.sketch_groups * kSketch;
-      if (changed) add_sketch(column, change, t.sketch_groups, s.change.data());
-      if (lit) add_sketch(column, light, t.sketch_groups, s.target.data());
+      const float* column = t.sketch.data() + j * t.sketch_size();
+      if (changed) add_sketch(column, change, t.lanes, t.sketch_size(), s.change.data());
+      if (lit) add_sketch(column, light, t.lanes, t.sketch_size(), s.target.data());
       if (!with_bound) continue;
-      const float* norm = t.norm.data() + j * t.norm_groups * 3;
-      const float* sum = t.sum.data() + j * t.norm_groups * 3;
-      for (std::size_t k = 0; k < 3 * t.norm_groups; ++k) {
+      const float* norm = t.norm.data() + j * t.groups * 3;
+      const float* sum = t.sum.data() + j * t.groups * 3;
+      for (std::size_t k = 0; k < 3 * t.groups; ++k) {
         s.change_bound[k] += std::abs(change[k % 3]) * norm[k];
         s.target_bound[k] += std::abs(light[k % 3]) * norm[k];
         s.target_sum[k] += static_cast<double>(light[k % 3]) * static_cast<double>(sum[k]);
@@ -152,9 +139,10 @@ void ErrorEstimator::sum_up(std::span<const Rgb> target, std::span<const Rgb> sh
 
 double ErrorEstimator::weighted(const std::vector<double>& sketch) const {
   double sum = 0;
+  const std::size_t size = 3 * tables_->lanes;
   for (std::size_t g = 0; g < view_mean_.size(); ++g) {
     double group = 0;
-    for (std::size_t i = 0; i < kSketch; ++i) group += squared(sketch[g * kSketch + i]);
+    for (std::size_t i = 0; i < size; ++i) group += squared(sketch[g * size + i]);
     sum += view_mean_[g] * group;
   }
   return std::sqrt(sum);
@@ -173,11 +161,10 @@ void ErrorEstimator::begin(std::span<const Rgb> target, std::span<const Rgb> sho
 
 void ErrorEstimator::take(int index, const Rgb& difference) {
   const ErrorTables& t = *tables_;
-  const float* column =
-      t.sketch.data() + static_cast<std::size_t>(index) * t.sketch_groups * kSketch;
+  const float* column = t.sketch.data() + static_cast<std::size_t>(index) * t.sketch_size();
   const float x[3] = {difference.r, difference.g, difference.b};
   for (std::size_t k = 0; k < change_.size(); ++k) {
-    change_[k] -= static_cast<double>(column[k] * x[k / kLanes % 3]);
+    change_[k] -= static_cast<double>(column[k] * x[k / t.lanes % 3]);
   }
 }
 
@@ -196,7 +183,7 @@ PictureErrorGuess ErrorEstimator::judge(std::span<const Rgb> target, std::span<c
   // The largest that the difference, the least that the exact picture can be.
   const ErrorTables& t = *tables_;
   double most = 0, by_means = 0;
-  for (std::size_t g = 0; g < t.norm_groups; ++g) {
+  for (std::size_t g = 0; g < t.groups; ++g) {
     for (std::size_t ch = 0; ch < 3; ++ch) {
       const std::size_t k = 3 * g + ch;
       if (change_bound_[k] > 0) most += view_most_[g] * squared(kSumRounding * change_bound_[k]);

@@ -26,7 +26,7 @@ struct PictureErrorGuess {
 ///
 /// The estimate is || A d || / || A L ||, A = S T a sketch of T (ErrorTables), of which the lower
 /// term is corrected by what is known exactly: || picture(S) || / || A S || of the last frame.
-/// The bound is the triangle inequality by groups of chunks g and channels c,
+/// The bound is the triangle inequality by groups of rows g and channels c,
 ///   || T d ||^2 <= sum_gc (sum_j |d_jc| || T_jgc ||)^2,
 /// over the larger of || picture(S) || less that, and what the exact means of the picture over the
 /// groups say by themselves (Cauchy-Schwarz); the float rounding of both pictures is added. A mesh
@@ -68,13 +68,16 @@ class ErrorEstimator {
   std::shared_ptr<const ErrorTables> tables_;
   bool mesh_ = false;
   std::vector<std::uint32_t> row_output_;
-  std::vector<double> view_mean_, view_most_;  // per sketch group and norm group: see the source
+  std::vector<double> view_mean_, view_most_;  // per group: see the source
   double calibration_ = 1;                     // || picture || over the sketch's norm
 
   // Of the frame: sketches of d and of the target, [group][channel][lane], and for the bound.
   std::vector<double> change_, target_;
   std::vector<double> change_bound_, target_bound_, target_sum_;  // [group][channel]
-  struct Slice;
+  struct Slice {                                                  // likewise, of some coefficients
+    std::vector<float> change, target, change_bound, target_bound;
+    std::vector<double> target_sum;
+  };
   std::vector<Slice> slices_;
 };
 

@@ -14,10 +14,10 @@
 namespace haarlight {
 namespace {
 
-constexpr std::size_t kLanes = ErrorTables::kLanes;
-constexpr std::size_t kSketch = ErrorTables::kSketch;
+constexpr auto kRows = static_cast<std::size_t>(kBlockRows);
+constexpr std::size_t kBlock = 3 * kRows;  // [channel][row of block]
 constexpr int kColumnsOfTask = 64;
-constexpr std::size_t kMostNormGroups = 8, kMostSketchGroups = 4;
+constexpr std::size_t kPictureGroups = 8, kMeshGroups = 32, kMeshLanes = 4;
 
 // Norms are sums of floats: at most 256 blocks of squares in a lane, each square rounded three
 // times, are within 260 x 2^-24 < 2e-5 of the truth.
@@ -31,52 +31,67 @@ float sign_of(std::uint64_t row, std::uint64_t channel) {
   return (x ^ (x >> 31)) >> 63 ? 1.0f : -1.0f;
 }
 
-// What the rows of a chunk have in common with all columns, [block][channel][row of block].
+// What the rows have in common for all columns, [block][channel][row of block].
 struct RowFactors {
-  HugePageVector<float> factor;  // weight times colour
+  HugePageVector<float> factor, norm_factor;  // weight times colour
   HugePageVector<float> sign;
 };
 
-struct ColumnSums {
-  float sketch[kSketch], square[kSketch], sum[kSketch];
+// Sums over blocks of one group, and of one column.
+struct GroupSums {
+  float sketch[kBlock], square[kBlock], sum[kBlock];
 };
 
 // Adds a stored block; `values` of channel ch begin at ch * value_stride, as scales do.
 HAARLIGHT_MULTIVERSION void add_block(const std::int8_t* values, std::size_t value_stride,
-                                      const float* scales, const float* factor, const float* sign,
-                                      ColumnSums& out) {
+                                      const float* scales, const float* factor,
+                                      const float* norm_factor, const float* sign, GroupSums& out) {
   for (std::size_t ch = 0; ch < 3; ++ch) {
     const std::int8_t* q = values + ch * value_stride;
-    for (std::size_t r = 0; r < kLanes; ++r) {
-      const std::size_t k = ch * kLanes + r;
-      const float t = static_cast<float>(q[r]) * scales[ch] * factor[k];
-      out.sketch[k] += sign[k] * t;
-      out.square[k] += t * t;
-      out.sum[k] += t;
+    for (std::size_t r = 0; r < kRows; ++r) {
+      const std::size_t k = ch * kRows + r;
+      const float t = static_cast<float>(q[r]) * scales[ch];
+      const float weighted = t * factor[k], for_norm = t * norm_factor[k];
+      out.sketch[k] += sign[k] * weighted;
+      out.square[k] += for_norm * for_norm;
+      out.sum[k] += weighted;
     }
   }
 }
 
-void add_column(const std::uint64_t* rgb_blocks, const ColumnBlocks& blocks, const float* factor,
-                const float* sign, ColumnSums& out) {
+// Adds a column's blocks of a chunk, whose first block is `first`; done(group, sums) gets the sums
+// of every group that has any.
+template <typename Done>
+void add_column(const std::uint64_t* rgb_blocks, const ColumnBlocks& blocks, std::size_t first,
+                const RowFactors& rows, const std::vector<std::uint8_t>& group_of_block,
+                const Done& done) {
   const std::uint16_t* scale = blocks.scales;
   const std::int8_t* value = blocks.values;
+  GroupSums part{};
+  std::size_t group = ~std::size_t{0};
   for (std::size_t word = 0; word < 4; ++word) {
     for (std::uint64_t bits = blocks.present[word]; bits; bits &= bits - 1) {
       const auto bit = static_cast<std::size_t>(std::countr_zero(bits));
-      const std::size_t at = (64 * word + bit) * kSketch;
+      const std::size_t block = first + 64 * word + bit, at = block * kBlock;
+      if (group_of_block[block] != group) {
+        if (group != ~std::size_t{0}) done(group, part);
+        part = {};
+        group = group_of_block[block];
+      }
       const bool rgb = rgb_blocks[word] >> bit & 1;
       float scales[3];
       for (std::size_t ch = 0; ch < 3; ++ch) scales[ch] = scale_from_bits(scale[rgb ? ch : 0]);
-      add_block(value, rgb ? kLanes : 0, scales, factor + at, sign + at, out);
+      add_block(value, rgb ? kRows : 0, scales, rows.factor.data() + at,
+                rows.norm_factor.data() + at, rows.sign.data() + at, part);
       scale += rgb ? 3 : 1;
-      value += rgb ? 3 * kLanes : kLanes;
+      value += rgb ? 3 * kRows : kRows;
     }
   }
+  if (group != ~std::size_t{0}) done(group, part);
 }
 
-// Root of the area of surface around each vertex, a third of each triangle, over their mean.
-std::vector<float> vertex_weights(const TransportMesh& mesh) {
+// The area of surface around each vertex, a third of each triangle, over the mean of all.
+std::vector<float> vertex_areas(const TransportMesh& mesh) {
   std::vector<double> area(mesh.position.size());
   for (const auto& corner : mesh.triangle) {
     const Vec3 a = mesh.world(corner[0]), b = mesh.world(corner[1]), c = mesh.world(corner[2]);
@@ -86,12 +101,10 @@ std::vector<float> vertex_weights(const TransportMesh& mesh) {
   }
   double mean = 0;
   for (const double a : area) mean += a / static_cast<double>(area.size());
-  std::vector<float> weight(area.size(), 1.0f);
-  if (!(mean > 0)) return weight;
-  for (std::size_t v = 0; v < area.size(); ++v) {
-    weight[v] = static_cast<float>(std::sqrt(area[v] / mean));
-  }
-  return weight;
+  std::vector<float> relative(area.size(), 1.0f);
+  if (!(mean > 0)) return relative;
+  for (std::size_t v = 0; v < area.size(); ++v) relative[v] = static_cast<float>(area[v] / mean);
+  return relative;
 }
 
 }  // namespace
@@ -99,72 +112,80 @@ std::vector<float> vertex_weights(const TransportMesh& mesh) {
 ErrorTables::ErrorTables(const Transport& transport) {
   const auto columns = static_cast<std::size_t>(transport.layout().size());
   const auto rows = static_cast<std::size_t>(transport.rows());
+  const std::size_t blocks = rows / kRows;
   const bool mesh = transport.kind() == TransportKind::mesh;
-  chunks_ = static_cast<std::size_t>(transport.chunk_count());
-  norm_groups = std::clamp<std::size_t>(chunks_, 1, kMostNormGroups);
-  sketch_groups = mesh ? std::clamp<std::size_t>(chunks_, 1, kMostSketchGroups) : 1;
+  lanes = mesh ? kMeshLanes : kRows;
+  groups = std::clamp<std::size_t>(blocks, 1, mesh ? kMeshGroups : kPictureGroups);
+  sketch_groups = mesh ? groups : 1;
 
-  // Weights, colours and signs of rows.
+  // Areas, colours and signs of rows. Groups share out the blocks that have a meaning.
   std::vector<float> of_output;
-  if (mesh) of_output = vertex_weights(*transport.info().mesh);
-  row_weight.assign(rows, 0.0f);
-  group_weight.assign(norm_groups, 0.0);
-  group_rows.assign(norm_groups, 0);
+  if (mesh) of_output = vertex_areas(*transport.info().mesh);
+  const std::span<const std::uint32_t> output = transport.row_output();
+  std::size_t last = rows;
+  while (last > 1 && output[last - 1] == kNoOutput) --last;
+  const std::size_t used = (last + kRows - 1) / kRows;
+  group_of_block_.resize(blocks);
+  for (std::size_t b = 0; b < blocks; ++b) {
+    group_of_block_[b] = static_cast<std::uint8_t>(std::min(b * groups / used, groups - 1));
+  }
+  area.assign(rows, 0.0f);
+  group_rows.assign(groups, 0);
   RowFactors all;
-  all.factor.resize(3 * rows);
-  all.sign.resize(3 * rows);
+  for (auto* factor : {&all.factor, &all.norm_factor, &all.sign}) factor->resize(3 * rows);
   for (std::size_t row = 0; row < rows; ++row) {
-    const std::uint32_t output = transport.row_output()[row];
-    if (output == kNoOutput) continue;
-    const float weight = mesh ? of_output[output] : 1.0f;
-    const std::size_t g = norm_group(static_cast<int>(row / kChunkRows));
-    row_weight[row] = weight;
-    group_weight[g] += static_cast<double>(weight) * static_cast<double>(weight);
-    ++group_rows[g];
-    const Rgb color = weight * transport.row_color()[row];
+    if (output[row] == kNoOutput) continue;
+    area[row] = mesh ? of_output[output[row]] : 1.0f;
+    ++group_rows[group_of_row(row)];
+    const Rgb color = transport.row_color()[row];
     const float channel[3] = {color.r, color.g, color.b};
+    const float weight = std::sqrt(area[row]);
+    const float norm_weight = mesh ? std::sqrt(area[row] + 1) : 1.0f;
     for (std::size_t ch = 0; ch < 3; ++ch) {
-      const std::size_t k = row / kLanes * kSketch + ch * kLanes + row % kLanes;
-      all.factor[k] = channel[ch];
+      const std::size_t k = row / kRows * kBlock + ch * kRows + row % kRows;
+      all.factor[k] = weight * channel[ch];
+      all.norm_factor[k] = norm_weight * channel[ch];
       all.sign[k] = sign_of(row, ch);
     }
   }
 
-  sketch.resize(columns * sketch_groups * kSketch);
-  norm.resize(columns * norm_groups * 3);
-  sum.resize(columns * norm_groups * 3);
+  sketch.resize(columns * sketch_size());
+  norm.resize(columns * groups * 3);
+  sum.resize(columns * groups * 3);
   const int tasks = (static_cast<int>(columns) + kColumnsOfTask - 1) / kColumnsOfTask;
   parallel_for(tasks, [&](int task) {
     const int begin = task * kColumnsOfTask;
     const int end = std::min(begin + kColumnsOfTask, static_cast<int>(columns));
     const auto count = static_cast<std::size_t>(end - begin);
-    std::vector<double> sketches(count * sketch_groups * kSketch);
-    std::vector<double> squares(count * norm_groups * 3), sums(count * norm_groups * 3);
+    std::vector<double> sketches(count * sketch_size());
+    std::vector<double> squares(count * groups * 3), sums(count * groups * 3);
     for (int chunk = 0; chunk < transport.chunk_count(); ++chunk) {
-      const std::size_t first = static_cast<std::size_t>(chunk) * kChunkRows * 3;
+      const std::size_t first = static_cast<std::size_t>(chunk) * kChunkBlocks;
       for (int j = begin; j < end; ++j) {
-        const ColumnBlocks blocks = transport.column(chunk, j);
-        if (!blocks.present) continue;
-        ColumnSums part{};
-        add_column(transport.rgb_blocks(chunk), blocks, all.factor.data() + first,
-                   all.sign.data() + first, part);
-        const auto k = static_cast<std::size_t>(j - begin);
-        double* to = sketches.data() + (k * sketch_groups + sketch_group(chunk)) * kSketch;
-        for (std::size_t i = 0; i < kSketch; ++i) to[i] += static_cast<double>(part.sketch[i]);
-        const std::size_t at = (k * norm_groups + norm_group(chunk)) * 3;
-        for (std::size_t i = 0; i < kSketch; ++i) {
-          squares[at + i / kLanes] += static_cast<double>(part.square[i]);
-          sums[at + i / kLanes] += static_cast<double>(part.sum[i]);
-        }
+        const ColumnBlocks stored = transport.column(chunk, j);
+        if (!stored.present) continue;
+        const auto column = static_cast<std::size_t>(j - begin);
+        add_column(transport.rgb_blocks(chunk), stored, first, all, group_of_block_,
+                   [&](std::size_t group, const GroupSums& part) {
+                     double* to = sketches.data() + column * sketch_size() +
+                                  (sketch_groups > 1 ? group * 3 * lanes : 0);
+                     const std::size_t at = (column * groups + group) * 3;
+                     for (std::size_t k = 0; k < kBlock; ++k) {
+                       const std::size_t ch = k / kRows;
+                       to[ch * lanes + k % lanes] += static_cast<double>(part.sketch[k]);
+                       squares[at + ch] += static_cast<double>(part.square[k]);
+                       sums[at + ch] += static_cast<double>(part.sum[k]);
+                     }
+                   });
       }
     }
     const auto place = static_cast<std::size_t>(begin);
     for (std::size_t i = 0; i < sketches.size(); ++i) {
-      sketch[place * sketch_groups * kSketch + i] = static_cast<float>(sketches[i]);
+      sketch[place * sketch_size() + i] = static_cast<float>(sketches[i]);
     }
     for (std::size_t i = 0; i < squares.size(); ++i) {
-      norm[place * norm_groups * 3 + i] = static_cast<float>(std::sqrt(squares[i]) * kNormRounding);
-      sum[place * norm_groups * 3 + i] = static_cast<float>(sums[i]);
+      norm[place * groups * 3 + i] = static_cast<float>(std::sqrt(squares[i]) * kNormRounding);
+      sum[place * groups * 3 + i] = static_cast<float>(sums[i]);
     }
   });
 }

@@ -38,12 +38,18 @@ double picture_norm(const Image& picture) {
   return std::sqrt(sum);
 }
 
-std::vector<double> column_bytes(const Transport& transport) {
-  std::vector<double> bytes(static_cast<std::size_t>(transport.layout().size()));
-  for (std::size_t j = 0; j < bytes.size(); ++j) {
-    bytes[j] = static_cast<double>(transport.column_bytes(static_cast<int>(j)));
+// What streaming a column is like, in bytes: a column is a run in each chunk, and to begin one
+// takes as long as to read a kilobyte.
+std::vector<double> column_costs(const Transport& transport) {
+  std::vector<double> costs(static_cast<std::size_t>(transport.layout().size()));
+  for (std::size_t j = 0; j < costs.size(); ++j) {
+    const int index = static_cast<int>(j);
+    costs[j] = static_cast<double>(transport.column_bytes(index));
+    for (int chunk = 0; chunk < transport.chunk_count(); ++chunk) {
+      if (transport.column(chunk, index).present) costs[j] += 1024;
+    }
   }
-  return bytes;
+  return costs;
 }
 
 }  // namespace
@@ -183,7 +189,7 @@ const FrameMetrics& FrameRelighter::relight(std::span<const Rgb> target, FrameSt
 
   // Decide which wavelets change, stream their columns, make the picture.
   if (budget_.kind == BudgetKind::error) estimator();
-  if (budget_.kind == BudgetKind::milliseconds && !time_) time_.emplace(column_bytes(transport()));
+  if (budget_.kind == BudgetKind::milliseconds && !time_) time_.emplace(column_costs(transport()));
   const Clock::time_point begin = Clock::now();
   if (budget_.kind == BudgetKind::milliseconds) {
     reset_bytes_.resize(static_cast<std::size_t>(layout.band_count()));

@@ -112,10 +112,10 @@ class FrameRelighter {
   std::optional<Exact> exact_;
   bool compare_ = false;
   FrameBudget budget_;
-  std::optional<TimeBudget> time_;         // of the last frames; made when first asked for
-  std::optional<ErrorEstimator> errors_;   // likewise
+  std::optional<TimeBudget> time_;        // of the last frames; made when first asked for
+  std::optional<ErrorEstimator> errors_;  // likewise
   bool judge_ = false;
-  std::optional<Camera> judged_from_;      // the camera that errors_ knows
+  std::optional<Camera> judged_from_;  // the camera that errors_ knows
   std::vector<float> vertex_weights_;
   std::vector<double> reset_bytes_;
   std::optional<double> transport_error_;

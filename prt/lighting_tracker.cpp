@@ -221,8 +221,8 @@ const LightingUpdate& LightingTracker::advance(std::span<const Rgb> target, Upda
 const LightingUpdate& LightingTracker::advance(std::span<const Rgb> wanted, UpdateLimit* limit) {
   const std::span<const Rgb> target = take_in(wanted);
   // How many the limit will take is not known yet: about as many as it took before.
-  const int expected =
-      limit ? std::clamp(static_cast<int>(update_.deltas.size()), 1, kMostExpected) : options_.wavelets;
+  const int expected = limit ? std::clamp(static_cast<int>(update_.deltas.size()), 1, kMostExpected)
+                             : options_.wavelets;
   update_.reset.reset();
   update_.deltas.clear();
 
@@ -240,8 +240,9 @@ const LightingUpdate& LightingTracker::advance(std::span<const Rgb> wanted, Upda
   if (options_.method == LightingMethod::nwa) {
     for (std::size_t b = 0; b < bands; ++b) update_.reset[b] = true;
   } else if (options_.method == LightingMethod::pbi) {
-    update_.reset = options_.band_choice == BandChoice::simple ? choose_bands_simply()
-                                                               : choose_bands_exhaustively(expected);
+    update_.reset = options_.band_choice == BandChoice::simple
+                        ? choose_bands_simply()
+                        : choose_bands_exhaustively(expected);
   }
 
   // Forget the reset bands (line 14) and pick wavelets over all bands together (line 3).

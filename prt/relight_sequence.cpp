@@ -52,6 +52,8 @@ void relight_sequence(const Transport& transport, const Environment& from, const
   Motion motion(options.motion, transport.layout(), from, to);
   FrameRelighter relighter(transport, options.lighting, options.weight, make);
   relighter.compare_with_reference(options.against_reference);
+  relighter.judge_errors(options.judge_errors);
+  relighter.set_budget(options.budget);
   for (int frame = 0; frame < options.frames; ++frame) {
     const std::span<const Rgb> target = motion.coefficients(frame);
     const FrameStart start =
@@ -83,6 +85,7 @@ void relight_recording(const Transport& transport, std::span<const Environment> 
   const RecordedFrame& first = recording.frames.front();
   FrameRelighter relighter(transport, options_of(first), first.weight, make);
   relighter.compare_with_reference(against_reference);
+  relighter.judge_errors(true);
   const int frames = static_cast<int>(recording.frames.size());
   for (int i = 0; i < frames; ++i) {
     const RecordedFrame& frame = recording.frames[static_cast<std::size_t>(i)];

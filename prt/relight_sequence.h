@@ -21,6 +21,8 @@ struct SequenceOptions {
   int frames = 130;          ///< >= 1; the light rests from frame motion.stop on
   LightingOptions lighting;  ///< its `weights` are ignored: `weight` says which
   WaveletWeight weight = WaveletWeight::area;
+  FrameBudget budget;        ///< in time or error instead of lighting.wavelets
+  bool judge_errors = true;  ///< estimate errors, where that can be; see FrameMetrics
   bool from_dark = false;    ///< start with nothing shown; else frame 0 is exact (Overbeck 2006, 3)
   double orbit_degrees = 0;  ///< of a mesh: the camera goes round the vertical axis through the
                              ///< mesh's middle by orbit_degrees * t, t = min(frame, stop) / stop

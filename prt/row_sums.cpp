@@ -19,7 +19,8 @@ namespace haarlight {
 namespace {
 
 // A band's log is folded into a kept picture when streaming it would cost this many pictures of
-// sums. Folding costs the log once more and a read and a write of the picture.
+// sums, its oldest columns first, about one picture's worth in a frame: so much more than a read
+// and a write of the picture that no time is lost by folding in parts, and no frame waits long.
 constexpr std::uint64_t kFoldPictures = 4;
 
 // Above so many columns a chunk's runs are next to each other or past what caches hold.
@@ -172,12 +173,22 @@ struct RowSums::State {
     return 2 * blocks_touched.load() * kBlockTotals * sizeof(double);
   }
 
-  void fold(Band& b, ApplyStats& stats) {
-    std::sort(b.log.begin(), b.log.end());
+  // The oldest columns of a log, of `bytes` together or a little more, into the kept picture.
+  void fold(Band& b, std::uint64_t bytes, ApplyStats& stats) {
+    std::size_t count = 0;
+    std::uint64_t folded = 0;
     columns_scratch.clear();
-    for (int index : b.log) {
-      columns_scratch.push_back({index, logged[static_cast<std::size_t>(index)]});
+    while (count < b.log.size() && folded < bytes) {
+      const auto j = static_cast<std::size_t>(b.log[count++]);
+      columns_scratch.push_back({static_cast<int>(j), logged[j]});
+      folded += bytes_of[j];
+      logged[j] = {};
+      in_log[j] = 0;
     }
+    b.log.erase(b.log.begin(), b.log.begin() + static_cast<std::ptrdiff_t>(count));
+    b.log_bytes -= folded;
+    std::sort(columns_scratch.begin(), columns_scratch.end(),
+              [](const WaveletDelta& x, const WaveletDelta& y) { return x.index < y.index; });
     const bool fresh = !b.kept_lit;
     if (b.kept.empty()) b.kept.resize(totals.size());
     stats.sum_bytes += stream(columns_scratch, b.kept,
@@ -187,10 +198,9 @@ struct RowSums::State {
                               },
                               {});
     if (fresh) stats.sum_bytes += picture_bytes();
-    stats.transport_bytes += b.log_bytes;
+    stats.transport_bytes += folded;
     stats.columns += static_cast<int>(columns_scratch.size());
     b.kept_lit = true;
-    clear_log(b);
   }
 };
 
@@ -214,7 +224,7 @@ ApplyStats RowSums::apply(const LightingUpdate& update, const ChunkDone& done) {
 
   State::Band* longest = from_zero || update.empty() ? nullptr : s.to_fold();
   if (longest && !update.reset[static_cast<std::size_t>(longest - s.band.data())]) {
-    s.fold(*longest, stats);
+    s.fold(*longest, s.picture_bytes(), stats);
   }
 
   // Gather the columns to stream: what reset bands logged, taken back, and the update's deltas.
@@ -297,7 +307,7 @@ ApplyStats RowSums::apply(const LightingUpdate& update, const ChunkDone& done) {
 
   // A picture that starts anew with all of its light has long logs, and time: frames after it not.
   if (from_zero) {
-    while (State::Band* band = s.to_fold()) s.fold(*band, stats);
+    while (State::Band* band = s.to_fold()) s.fold(*band, band->log_bytes, stats);
   }
   return stats;
 }
@@ -311,8 +321,8 @@ std::uint64_t RowSums::reset_bytes(int band) const {
 
 std::uint64_t RowSums::fold_bytes() const {
   const State::Band* longest = state_->to_fold();
-  // The log, and the kept picture read and written.
-  return longest ? longest->log_bytes + 2 * state_->picture_bytes() : 0;
+  // A picture's worth of columns, and the kept picture read and written.
+  return longest ? 3 * state_->picture_bytes() : 0;
 }
 
 const Transport& RowSums::transport() const { return state_->transport; }

@@ -26,7 +26,7 @@ struct ApplyStats {
 /// since the band was last empty (or last folded). A reset takes the logged columns back; a log
 /// that has grown past a few pictures' worth of bytes is folded into a kept picture of the band,
 /// once, so that a later reset subtracts that instead. Bands that never reset need no picture. One
-/// band is folded in a frame, at its beginning and only if it is not reset by it.
+/// band is folded in a frame, in part, and only if the frame does not reset it.
 ///
 /// Accuracy: |total - T shown| <= (K + 2n) 2^-53 S, K the updates since the sums were last empty,
 /// n the terms of one sum, S the largest sum |T| |shown| met. When nothing is shown the total is +0

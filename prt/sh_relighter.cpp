@@ -76,7 +76,8 @@ ShRelighter::ShRelighter(const Transport& transport, const ShOptions& options)
   shown_.resize(count);
   deltas_.reserve(2 * count);
 
-  // A grey column does not mind the light's colour: three functions go in one pass, as its channels.
+  // A grey column does not mind the light's colour: three functions go in one pass, as its
+  // channels.
   const std::size_t together = channels_ == 1 ? 3 : 1;
   const auto size = static_cast<std::size_t>(transport.layout().size());
   RowSums sums(transport_);
@@ -86,7 +87,8 @@ ShRelighter::ShRelighter(const Transport& transport, const ShOptions& options)
     update.reset.set();
     for (std::size_t j = 0; j < size; ++j) {
       const auto y = [&](std::size_t i) {
-        return k + i < count ? static_cast<double>(projection_.haar(static_cast<int>(k + i))[j]) : 0.0;
+        return k + i < count ? static_cast<double>(projection_.haar(static_cast<int>(k + i))[j])
+                             : 0.0;
       };
       const RgbD light = together == 3 ? RgbD{y(0), y(1), y(2)} : RgbD{y(0), y(0), y(0)};
       if (!(light == RgbD{})) update.deltas.push_back({static_cast<int>(j), light});
@@ -117,7 +119,8 @@ ShRelighter::ShRelighter(const Transport& transport, const ShOptions& options)
 void ShRelighter::choose(std::span<const RgbD> wanted, Frame& frame) {
   std::vector<std::pair<double, std::size_t>> ranked;
   for (int l = 0; l < options_.order; ++l) {
-    const auto begin = static_cast<std::size_t>(l * l), end = static_cast<std::size_t>((l + 1) * (l + 1));
+    const auto begin = static_cast<std::size_t>(l * l),
+               end = static_cast<std::size_t>((l + 1) * (l + 1));
     double keep = 0, reset = 0, shown = 0;
     for (std::size_t k = begin; k < end; ++k) {
       keep += norm_[k] * l1_norm(wanted[k] - shown_[k]);

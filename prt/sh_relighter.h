@@ -23,8 +23,8 @@ struct ShOptions {
 };
 
 /// T_sh = T * Haar * Y, column by column; a column is dense. picture() == T_sh * shown, shown being
-/// the projection of the light or, incrementally, what has followed it: as PBI does with wavelets, a
-/// degree is a band, each is kept or reset by which leaves less (L1, weighted by the norms of
+/// the projection of the light or, incrementally, what has followed it: as PBI does with wavelets,
+/// a degree is a band, each is kept or reset by which leaves less (L1, weighted by the norms of
 /// columns), and the terms with the largest change go first.
 class ShRelighter {
  public:
@@ -33,9 +33,9 @@ class ShRelighter {
   ShRelighter(const Transport& transport, const ShOptions& options);
 
   struct Frame {
-    int updates = 0;      ///< functions changed
-    std::string resets;   ///< a digit a degree
-    double update_ms = 0; ///< projection and choice
+    int updates = 0;       ///< functions changed
+    std::string resets;    ///< a digit a degree
+    double update_ms = 0;  ///< projection and choice
     RelightStats stats;
   };
   /// Towards `target`, Haar coefficients as everywhere. `exact` shows all of its projection.
@@ -57,10 +57,10 @@ class ShRelighter {
   Transport transport_;
   ShOptions options_;
   ShProjection projection_;
-  std::size_t rows_, channels_;        // channels of a column: 1, or 3 if any block is RGB
-  HugePageVector<float> columns_;      // [function][block][channel][row of block]
-  std::vector<double> norm_;           // of columns, colours applied
-  HugePageVector<double> totals_;      // [block][channel][row of block]
+  std::size_t rows_, channels_;    // channels of a column: 1, or 3 if any block is RGB
+  HugePageVector<float> columns_;  // [function][block][channel][row of block]
+  std::vector<double> norm_;       // of columns, colours applied
+  HugePageVector<double> totals_;  // [block][channel][row of block]
   std::vector<RgbD> wanted_, shown_;
   std::vector<Delta> deltas_;
   Image picture_;

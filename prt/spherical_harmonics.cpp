@@ -61,9 +61,9 @@ void spherical_harmonics(int order, const Vec3& direction, std::span<double> val
 ShProjection::ShProjection(const HaarLayout& layout, int order)
     : order_(order), size_(static_cast<std::size_t>(layout.size())) {
   if (order < 1 || order > kMaxShOrder) {
-    throw Error(ErrorKind::invalid_argument,
-                fmt::format("order of spherical harmonics is {}, expected 1 to {}", order,
-                            kMaxShOrder));
+    throw Error(
+        ErrorKind::invalid_argument,
+        fmt::format("order of spherical harmonics is {}, expected 1 to {}", order, kMaxShOrder));
   }
   const auto count = static_cast<std::size_t>(sh_count(order));
   const int n = layout.face_size();

@@ -12,11 +12,12 @@ namespace {
 constexpr double kForget = 0.98;       // of a frame's weight, by the next frame
 constexpr double kPriorSpread = 0.05;  // of bytes, relative, squared: what the prior weighs
 constexpr std::size_t kRemembered = 200;
-constexpr std::size_t kMaySlip = 2;  // frames of kRemembered that may be slower than 1.1 times
-constexpr double kSlack = 1.1;
-constexpr double kLeastAim = 0.85;   // below that, time asked for would be left unspent
-constexpr double kOutlier = 1.5;     // a frame that took so much longer was held up by others
-constexpr std::size_t kWarm = 16;    // frames after which outliers are known as such
+constexpr std::size_t kMaySlip = 1;   // frames of kRemembered that may be slower than the slack
+constexpr double kSlack = 1.06;       // of the 1.1 that are promised: the future is a little worse
+constexpr double kSlowAtFirst = 1.2;  // as if one such frame had been seen
+constexpr double kLeastAim = 0.85;    // below that, time asked for would be left unspent
+constexpr double kOutlier = 1.5;      // a frame that took so much longer was held up by others
+constexpr std::size_t kWarm = 16;     // frames after which outliers are known as such
 
 }  // namespace
 
@@ -47,9 +48,10 @@ TimeBudget::TimeBudget(std::vector<double> column_bytes) : column_bytes_(std::mo
 }
 
 double TimeBudget::aim() const {
-  if (slower_.size() <= kWarm) return kLeastAim;
+  if (slower_.size() < kWarm) return kLeastAim;
   sorted_ = slower_;
-  const auto nth = sorted_.end() - static_cast<std::ptrdiff_t>(kMaySlip) - 1;
+  const std::size_t slips = kMaySlip * sorted_.size() / kRemembered;
+  const auto nth = sorted_.end() - static_cast<std::ptrdiff_t>(slips) - 1;
   std::nth_element(sorted_.begin(), nth, sorted_.end());
   return std::clamp(kSlack / *nth, kLeastAim, 1.0);
 }
@@ -88,17 +90,17 @@ void TimeBudget::finish(double milliseconds) {
   const double after = milliseconds - begun_ms_, predicted = model_.predict(moved_);
   if (slower_.size() < kWarm) {
     model_.add(moved_, after);
+    slower_.push_back(slower_.empty() ? kSlowAtFirst : 1);
   } else {
     const double ratio = milliseconds / (begun_ms_ + predicted);
     if (slower_.size() < kRemembered) {
       slower_.push_back(ratio);
     } else {
       slower_[next_slower_] = ratio;
+      next_slower_ = (next_slower_ + 1) % kRemembered;
     }
-    next_slower_ = (next_slower_ + 1) % kRemembered;
     model_.add(moved_, std::min(after, kOutlier * predicted));
   }
-  if (slower_.size() < kWarm) slower_.push_back(1);
   most_moved_ = std::max(most_moved_, moved_);
 }
 

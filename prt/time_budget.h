@@ -27,12 +27,12 @@ class FrameTimeModel {
 
  private:
   double weight_ = 0, bytes_ = 0, time_ = 0, bytes_bytes_ = 0, bytes_time_ = 0;
-  double fixed_ = 0, per_byte_ = 1e-3 / 4e6;  // 4 GB/s, until something is known
+  double fixed_ = 0, per_byte_ = 1 / 4e6;  // 4 GB/s, until something is known
 };
 
 /// Ends updates so that frames stay within a time. It aims below the time by as much as frames have
-/// been slower than predicted lately: of the last 200, all but two must have stayed within 1.1
-/// times the time asked for.
+/// been slower than predicted lately: all but the slowest of the last 200 would have stayed within
+/// 1.06 times the time asked for. At least 85 % of it is aimed at.
 class TimeBudget final : public UpdateLimit {
  public:
   using Clock = std::chrono::steady_clock;
@@ -67,7 +67,7 @@ class TimeBudget final : public UpdateLimit {
   Clock::time_point started_;
   bool any_ = false;
 
-  double most_moved_ = 0;  // of frames so far: growth is at most twofold
+  double most_moved_ = 0;       // of frames so far: growth is at most twofold
   std::vector<double> slower_;  // measured over predicted time, of the last frames, as a ring
   std::size_t next_slower_ = 0;
   mutable std::vector<double> sorted_;

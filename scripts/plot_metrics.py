@@ -20,7 +20,7 @@ import numpy as np
 
 COLUMNS = (
     "frame,method,wavelets,weight,updates,resets,lighting_error,image_rel_rmse,image_max_abs,"
-    "update_ms,apply_ms,finish_ms,total_ms,bytes"
+    "update_ms,apply_ms,finish_ms,total_ms,bytes,flicker,error_estimate,error_bound,transport_error"
 ).split(",")
 
 

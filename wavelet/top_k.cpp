@@ -58,7 +58,8 @@ int RankedKeys::next() {
   if (next_ == sorted_) {
     const auto at = [&](std::size_t i) { return packed_.begin() + static_cast<std::ptrdiff_t>(i); };
     const std::size_t end = std::min(packed_.size(), std::max(kFirstRanks, 2 * sorted_));
-    if (end < packed_.size()) std::nth_element(at(sorted_), at(end), packed_.end(), std::greater<>());
+    if (end < packed_.size())
+      std::nth_element(at(sorted_), at(end), packed_.end(), std::greater<>());
     std::sort(at(sorted_), at(end), std::greater<>());
     sorted_ = end;
   }

@@ -26,7 +26,8 @@ using Json = nlohmann::json;
 
 constexpr const char* kHeader =
     "frame,method,wavelets,weight,updates,resets,lighting_error,image_rel_rmse,image_max_abs,"
-    "update_ms,apply_ms,finish_ms,total_ms,bytes";
+    "update_ms,apply_ms,finish_ms,total_ms,bytes,flicker,error_estimate,error_bound,"
+    "transport_error";
 constexpr int kBands = 4;  // log2 of the face size, 16
 
 class EndToEnd : public testing::Test {

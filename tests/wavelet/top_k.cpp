@@ -49,5 +49,29 @@ TEST(TopK, NeverChoosesNothingOrNaN) {
   EXPECT_EQ(chosen, (std::vector<int>{3, 5}));
 }
 
+TEST(RankedKeys, GoThroughTheSameOrderOneByOne) {
+  std::mt19937_64 random(7);
+  RankedKeys ranked;
+  TopK top_k;
+  for (const int size : {1, 255, 256, 257, 2000}) {
+    std::vector<float> keys(static_cast<std::size_t>(size));
+    for (float& k : keys)
+      k = static_cast<float>(random() % 50) - 5.0f;  // ties, zeros, negative ones
+    ranked.start(keys);
+    std::vector<int> so_far, chosen;
+    float last = std::numeric_limits<float>::infinity();
+    for (int index = ranked.next(); index >= 0; index = ranked.next()) {
+      EXPECT_LE(keys[static_cast<std::size_t>(index)], last);
+      last = keys[static_cast<std::size_t>(index)];
+      so_far.insert(std::lower_bound(so_far.begin(), so_far.end(), index), index);
+      top_k.select(keys, static_cast<int>(so_far.size()), chosen);
+      EXPECT_EQ(so_far, chosen);
+    }
+    EXPECT_EQ(so_far.size(), static_cast<std::size_t>(std::count_if(
+                                 keys.begin(), keys.end(), [](float k) { return k > 0; })));
+    EXPECT_EQ(ranked.next(), -1);
+  }
+}
+
 }  // namespace
 }  // namespace haarlight
