@@ -40,13 +40,16 @@ double squared(double x) { return x * x; }
 
 }  // namespace
 
-bool ErrorEstimator::fits(const Transport& transport) { return transport.info().terms == 1; }
+bool ErrorEstimator::fits(const Transport& transport) {
+  const TransportInfo& info = transport.info();
+  return info.terms == 1 && !info.view && !info.clusters;
+}
 
 ErrorEstimator::ErrorEstimator(const Transport& transport) {
   if (!fits(transport)) {
     throw Error(ErrorKind::invalid_argument,
-                "the transport has several terms an output, expected one: its picture's error "
-                "cannot be estimated");
+                "the transport has view factors or clusters, expected rows that are pixels or "
+                "vertices: its picture's error cannot be estimated");
   }
   tables_ = std::make_shared<const ErrorTables>(transport);
   mesh_ = transport.kind() == TransportKind::mesh;

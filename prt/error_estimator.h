@@ -34,7 +34,8 @@ struct PictureErrorGuess {
 /// most the mean of theirs.
 class ErrorEstimator {
  public:
-  /// Whether there is an estimate for such a transport: one term an output.
+  /// Whether there is an estimate for such a transport: rows are pixels, or vertices that look
+  /// alike from everywhere.
   static bool fits(const Transport& transport);
 
   /// Reads the whole transport once. Throws Error{invalid_argument} unless it fits.

@@ -122,7 +122,7 @@ void FrameRelighter::set_budget(const FrameBudget& budget) {
   if (budget.kind == BudgetKind::error && !can_judge()) {
     throw Error(ErrorKind::invalid_argument,
                 "an error as budget, expected a transport whose picture's error can be estimated: "
-                "of a picture, or of a mesh with one term a vertex");
+                "of a picture, or of a mesh without view factors");
   }
   budget_ = budget;
 }
