@@ -79,7 +79,9 @@ ErrorEstimator::ErrorEstimator(const Transport& transport) {
 void ErrorEstimator::set_vertex_weights(std::span<const float> weights) {
   if (!mesh_) return;
   const ErrorTables& t = *tables_;
-  std::vector<double> share(t.groups), area(t.groups);
+  std::vector<double>&share = target_sum_, &area = view_mean_;  // scratch; no heap
+  std::fill(share.begin(), share.end(), 0.0);
+  std::fill(area.begin(), area.end(), 0.0);
   std::fill(view_most_.begin(), view_most_.end(), 0.0);
   for (std::size_t row = 0; row < row_output_.size(); ++row) {
     if (row_output_[row] == kNoOutput) continue;

@@ -9,21 +9,25 @@ namespace haarlight {
 
 class ErrorLimit final : public UpdateLimit {
  public:
-  /// Takes wavelets until estimator.estimate() is at most `error`. The estimator must outlive it.
+  /// Takes wavelets until estimator.estimate() is at most `error`; one at least where there is one,
+  /// so that a light at rest arrives. The estimator must outlive it.
   ErrorLimit(ErrorEstimator& estimator, double error) : estimator_(estimator), error_(error) {}
 
   void begin(std::span<const Rgb> target, std::span<const Rgb> shown, const BandMask&) override {
     estimator_.begin(target, shown);
+    any_ = false;
   }
   bool take(int index, const Rgb& difference) override {
-    if (estimator_.estimate() <= error_) return false;
+    if (any_ && estimator_.estimate() <= error_) return false;
     estimator_.take(index, difference);
+    any_ = true;
     return true;
   }
 
  private:
   ErrorEstimator& estimator_;
   double error_;
+  bool any_ = false;
 };
 
 }  // namespace haarlight

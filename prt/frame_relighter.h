@@ -71,6 +71,8 @@ class FrameRelighter {
   /// Whether frames say error_estimate and error_bound, where that can be. Not before it is asked
   /// for is the transport read for it. Its time is in no metric.
   void judge_errors(bool judge) { judge_ = judge; }
+  /// Whether there is an estimate for this transport.
+  bool can_judge() const;
   /// What ends updates from the next frame on. Throws Error{invalid_argument} for a value out of
   /// range, or an error where none can be estimated.
   void set_budget(const FrameBudget& budget);
@@ -96,7 +98,6 @@ class FrameRelighter {
  private:
   void go_dark();
   const LightingUpdate& decide(std::span<const Rgb> target, FrameStart start);
-  bool can_judge() const;
   ErrorEstimator& estimator();
   void judge(std::span<const Rgb> target);
   void follow_flicker();

@@ -434,12 +434,20 @@ void Interface::draw_method(const ViewFrame& frame) {
                                                              {"Exact", LightingMethod::reference}}},
       settings_.method, marker);
   choose<BudgetKind>(
-      std::array<std::pair<const char*, BudgetKind>, 2>{
-          {{"by wavelets", BudgetKind::wavelets}, {"by time", BudgetKind::milliseconds}}},
+      std::array<std::pair<const char*, BudgetKind>, 3>{{{"wavelets", BudgetKind::wavelets},
+                                                         {"time", BudgetKind::milliseconds},
+                                                         {"error", BudgetKind::error}}},
       settings_.budget, marker);
   if (settings_.budget == BudgetKind::wavelets) {
     ImGui::SliderInt("##wavelets", &settings_.wavelets, 1, 4096, "%d wavelets a frame",
                      ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp);
+    mark("budget");
+  } else if (settings_.budget == BudgetKind::error) {
+    auto percent = static_cast<float>(100 * settings_.error);
+    if (ImGui::SliderFloat("##error", &percent, 0.01f, 50, "%.2f %% picture error",
+                           ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp)) {
+      settings_.error = static_cast<double>(percent) / 100;
+    }
     mark("budget");
   } else {
     auto ms = static_cast<float>(settings_.milliseconds);
@@ -630,9 +638,11 @@ void Interface::draw_overlay(const ViewFrame& frame) {
     }
     if (!second_.empty()) label(second_.x + 12 * s, second_.y + 10 * s, white, "exact");
     // The light is still there, or the picture is on its way to it.
-    const std::string state = frame.converged
-                                  ? std::string("exact")
-                                  : fmt::format("error {:.4f}", frame.metrics.lighting_error);
+    const std::string state =
+        frame.converged ? std::string("exact")
+        : frame.metrics.error_estimate
+            ? fmt::format("picture error about {:.2f} %", 100 * *frame.metrics.error_estimate)
+            : fmt::format("lighting error {:.4f}", frame.metrics.lighting_error);
     const float width = ImGui::CalcTextSize(state.c_str()).x;
     label(first_.x + first_.width - width - 14 * s, first_.y + first_.height - line - 12 * s,
           frame.converged ? IM_COL32(130, 214, 120, 255) : kOrange, state);

@@ -59,7 +59,7 @@ void add_words(CLI::App& app, const std::string& name, T& target,
 struct CommandLine {
   RunOptions run;
   bool headless = false, no_memory = false;
-  double milliseconds = 0, scale = 0;
+  double milliseconds = 0, error = 0, scale = 0;
   std::string exposure = "auto", tonemap = "filmic", size;
   int threads = 0;
 };
@@ -91,9 +91,16 @@ void add_options(CLI::App& app, CommandLine& c) {
   CLI::Option* wavelets =
       app.add_option("--wavelets", s.wavelets, "most wavelets changed in a frame [30]")
           ->check(CLI::Range(1, kMaxWavelets));
-  app.add_option("--ms", c.milliseconds, "as many wavelets as keep a frame within so much time")
-      ->check(CLI::Range(0.01, 10000.0))
-      ->excludes(wavelets);
+  CLI::Option* time = app.add_option("--ms,--budget-ms", c.milliseconds,
+                                     "as many wavelets as keep a frame within so much time")
+                          ->check(CLI::Range(0.01, 10000.0))
+                          ->excludes(wavelets);
+  app.add_option("--target-error", c.error,
+                 "as few wavelets as keep the estimated relative error of the picture at or below "
+                 "this")
+      ->check(CLI::Range(1e-6, 1.0))
+      ->excludes(wavelets)
+      ->excludes(time);
   add_words<WaveletWeight>(app, "--weight", s.weight,
                            {{"none", WaveletWeight::none},
                             {"area", WaveletWeight::area},
@@ -134,6 +141,10 @@ void finish_options(CommandLine& c) {
   if (c.milliseconds > 0) {
     r.settings.budget = BudgetKind::milliseconds;
     r.settings.milliseconds = c.milliseconds;
+  }
+  if (c.error > 0) {
+    r.settings.budget = BudgetKind::error;
+    r.settings.error = c.error;
   }
   if (c.exposure != "auto") {
     char* end = nullptr;

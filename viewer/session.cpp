@@ -46,6 +46,7 @@ void check(const ViewSettings& s) {
   };
   if (s.wavelets < 1 || s.wavelets > kMaxWavelets) refuse("wavelets", s.wavelets, "1 to 1048576");
   if (!(s.milliseconds > 0)) refuse("milliseconds", s.milliseconds, "more than 0");
+  if (!(s.error > 0)) refuse("error", s.error, "more than 0");
   if (!(s.speed >= 0 && s.speed <= 1000)) refuse("speed", s.speed, "0 to 1000");
   if (!std::isfinite(s.yaw) || !std::isfinite(s.pitch)) refuse("yaw", s.yaw, "finite angles");
   if (!std::isfinite(s.orbit) || !(std::abs(s.elevation) <= kPi)) {
@@ -151,6 +152,7 @@ void Session::open_transport(const std::filesystem::path& file) {
   LightRig rig(scene->transport.layout());
   for (std::size_t i = 0; i < lights_.size(); ++i) rig.set_environment(i, lights_[i]->environment);
   FrameRelighter relighter(scene->transport, {}, WaveletWeight::area, any_relighter());
+  relighter.judge_errors(true);
   const auto& mesh = scene->transport.info().mesh;
   middle_ = mesh ? bounding_sphere(*mesh) : BoundingSphere{};
   scene_ = std::move(scene);
@@ -240,6 +242,14 @@ void Session::set_view(const ViewSettings& settings) {
   relighter_->set_camera(camera);
 }
 
+FrameBudget Session::budget(const ViewSettings& settings) const {
+  if (settings.budget == BudgetKind::milliseconds) return {settings.budget, settings.milliseconds};
+  if (settings.budget == BudgetKind::error && relighter_->can_judge()) {
+    return {settings.budget, settings.error};
+  }
+  return {};
+}
+
 void Session::move_on(const ViewSettings& settings, double ticks) {
   if (fade_ > 0) {
     blend_ = std::min(1.0, blend_ + fade_ * ticks);
@@ -286,22 +296,20 @@ bool Session::advance(const ViewSettings& settings, double ticks, ViewFrame& out
 
   LightingOptions lighting;
   lighting.method = settings.method;
-  lighting.wavelets =
-      settings.budget == BudgetKind::wavelets ? settings.wavelets : budget_.wavelets();
+  lighting.wavelets = settings.wavelets;
   relighter_->set_options(lighting, settings.weight);
+  relighter_->set_budget(budget(settings));
   relighter_->compare_with_reference(settings.compare);
   set_view(settings);
   const int number = static_cast<int>(frames_);
   metrics_ = relighter_->relight(target, next_start_, number);
-  if (settings.budget == BudgetKind::milliseconds && next_start_ == FrameStart::advance) {
-    budget_.measured(metrics_.total_ms, metrics_.updates, settings.milliseconds,
-                     relighter_->tracker().layout().size());
-  }
+  // Whatever ended the update, a replay ends it at the same number.
+  const int allowed = std::max(1, metrics_.wavelets);
   if (recording_now_) {
     std::optional<Camera> camera;
     if (scene_->transport.info().mesh) camera = relighter_->view().camera;
     recording_.frames.push_back(
-        {light_, settings.method, lighting.wavelets, settings.weight, next_start_, camera});
+        {light_, settings.method, allowed, settings.weight, next_start_, camera});
   }
   if (!exposure_) {
     exposure_ =
@@ -310,7 +318,7 @@ bool Session::advance(const ViewSettings& settings, double ticks, ViewFrame& out
                              : relight_picture_once(scene_->transport, target,
                                                     relighter_->view().camera, any_relighter()));
   }
-  allowed_ = lighting.wavelets;
+  allowed_ = allowed;
   next_start_ = FrameStart::advance;
   converged_ = metrics_.lighting_error == 0 && relighter_->settled();
   fresh_ = false;

@@ -12,7 +12,6 @@
 #include "prt/light_rig.h"
 #include "prt/motion_file.h"
 #include "prt/transport_mesh.h"
-#include "viewer/budget.h"
 #include "viewer/settings.h"
 #include "viewer/view_frame.h"
 
@@ -56,6 +55,7 @@ class Session {
   void start_recording();
   void set_light(const ViewSettings& settings);
   void set_view(const ViewSettings& settings);
+  FrameBudget budget(const ViewSettings& settings) const;
   void move_on(const ViewSettings& settings, double ticks);
   void fill(const ViewSettings& settings, ViewFrame& out);
   void fill_lighting(ViewFrame& out);
@@ -71,7 +71,6 @@ class Session {
   BoundingSphere middle_;  // of a mesh
   std::uint64_t view_number_ = 0;
   std::optional<Camera> camera_;  // that a mesh is drawn from
-  BudgetController budget_;
 
   int from_ = -1, to_ = -1;
   double blend_ = 0, fade_ = 0;  // fade_: of blend_ in a tick

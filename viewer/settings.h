@@ -12,11 +12,6 @@
 
 namespace haarlight::viewer {
 
-enum class BudgetKind {
-  wavelets,      ///< so many wavelets a frame
-  milliseconds,  ///< as many as keep relighting within so much time a frame
-};
-
 inline constexpr int kMaxDiscs = 8;
 inline constexpr int kMaxWavelets = 1 << 20;
 
@@ -26,6 +21,8 @@ struct ViewSettings {
   BudgetKind budget = BudgetKind::wavelets;
   int wavelets = 30;        ///< [1, kMaxWavelets]
   double milliseconds = 8;  ///< > 0; of deciding, applying and finishing together
+  double error = 0.01;  ///< > 0; estimated, relative, of the picture; by wavelets where there is
+                        ///< no estimate
   WaveletWeight weight = WaveletWeight::area;
 
   double yaw = 0, pitch = 0;  ///< radians: the light about +Y after about +X, by hand

@@ -44,7 +44,8 @@ FrameMetrics measured() {
 TEST(MetricsCsv, HeaderNamesTheColumns) {
   EXPECT_EQ(metrics_csv_header(),
             "frame,method,wavelets,weight,updates,resets,lighting_error,image_rel_rmse,"
-            "image_max_abs,update_ms,apply_ms,finish_ms,total_ms,bytes,flicker,error_estimate,error_bound,"
+            "image_max_abs,update_ms,apply_ms,finish_ms,total_ms,bytes,flicker,error_estimate,"
+            "error_bound,"
             "transport_error");
 }
 

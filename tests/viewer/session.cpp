@@ -87,7 +87,7 @@ TEST(Session, PictureIsTransportTimesShownWhateverIsAsked) {
         break;
       case 2:
         s.wavelets = 1 + pick(60);
-        s.budget = static_cast<BudgetKind>(pick(2));
+        s.budget = static_cast<BudgetKind>(pick(3));
         break;
       case 3:
         s.yaw = 0.1 * pick(60);

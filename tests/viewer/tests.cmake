@@ -1,5 +1,4 @@
 haarlight_test(viewer/session haarlight_viewer)
-haarlight_test(viewer/budget haarlight_viewer)
 haarlight_test(viewer/worker haarlight_viewer)
 haarlight_test(viewer/lighting_picture haarlight_viewer)
 haarlight_test(viewer/preferences haarlight_viewer)

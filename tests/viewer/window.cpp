@@ -125,7 +125,7 @@ TEST_F(ViewWindow, DoesWhatKeysAndPointerSay) {
       "drag 0.3 0.5 0.8 0.5 picture\nsettle\nshot_picture turned.png\n"
       "key 1\nwait 5\nkey space\nwait 20\nexpect_method nwa\nkey space\n"
       "key 4\nsettle\nexpect_method reference\n"
-      "click PBI\nclick by time\nclick by wavelets\nclick add lamp\nsettle\n"
+      "click PBI\nclick time\nclick error\nclick wavelets\nclick add lamp\nsettle\n"
       "shot_picture lamp.png\n"
       "drag 0.5 0.5 0.9 0.5 budget\ndrag 0.2 0.2 0.4 0.3 map\nclick cube\nclick play\nwait 10\n"
       "click play\nkey c\nwait 5\ndrag 0.5 0.5 0.2 0.5 picture\nkey c\nkey f\nwait 5\n"

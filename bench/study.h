@@ -1,0 +1,38 @@
+// haarlight-study: numbers for bench/curves.py that `haarlight relight` does not print.
+
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "prt/lighting_tracker.h"
+#include "prt/motion.h"
+#include "prt/sh_relighter.h"
+
+namespace haarlight::bench {
+
+struct StudyOptions {
+  std::filesystem::path env, env_to, output;
+  MotionOptions motion;
+  int frames = 130;
+};
+
+/// Metrics as relight's, method "sh5" or "sh5i" (incremental), against the exact picture; pictures
+/// of `save` frames as frame_0000.exr in `folder`.
+void study_sh(const StudyOptions& options, const std::filesystem::path& transport,
+              const ShOptions& sh, const std::filesystem::path& folder,
+              const std::vector<int>& save);
+
+/// Which wavelets a method chooses: a row a frame and band with the number chosen, and, for the
+/// frames in `maps`, how many of the chosen wavelets lie over each texel (frame, face, y, x, count;
+/// zeros are left out), in OUTPUT.map.csv. Overbeck 2006, Figure 4.
+void study_chosen(const StudyOptions& options, int face, const LightingOptions& lighting,
+                  const std::vector<int>& maps);
+
+/// Energy of the lighting by spatial and temporal wavelet band over 128 frames: a row a pair.
+/// Overbeck 2006, Figure 5. Temporal band 0 is the mean, band b >= 1 wavelets of 128 / 2^(b-1)
+/// frames.
+void study_energy(const StudyOptions& options, int face);
+
+}  // namespace haarlight::bench
