@@ -363,6 +363,10 @@ Verb add_relight(CLI::App& verb) {
                 "also relight exactly, and fill the columns image_rel_rmse, image_max_abs and "
                 "flicker")
       ->group("Output");
+  verb.add_flag_function(
+          "--no-estimate", [&s](std::int64_t) { s.judge_errors = false; },
+          "leave error_estimate and error_bound empty, and take no time for them")
+      ->group("Output");
   add_threads(verb)->group("Output");
 
   for (const char* name :

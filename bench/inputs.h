@@ -25,6 +25,7 @@ struct Inputs {
 /// Filled by main before the cases run.
 Inputs& inputs();
 
+void register_kernels();
 void register_memory();
 void register_decide();
 void register_relight();

@@ -27,6 +27,8 @@ namespace {
 
 int run(const std::string& transport, const std::string& environment, const std::string& scene) {
   Inputs& in = inputs();
+  register_memory();
+  register_kernels();
   if (!transport.empty()) {
     in.transport = Transport::open(transport);
     const Environment light = load_environment(environment);
@@ -38,7 +40,6 @@ int run(const std::string& transport, const std::string& environment, const std:
     fmt::print("transport {}: {}x{}, {:.1f} MiB of columns; {} kernel\n", transport,
                in.transport->width(), in.transport->height(),
                static_cast<double>(in.transport->chunk_bytes()) / 1048576, apply_kernel_name());
-    register_memory();
     register_decide();
     register_relight();
     register_accumulate();
@@ -76,7 +77,8 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Measures relighting and ray tracing, and prints ratios to the machine's own limits.\n"
       "All --benchmark_* flags of Google Benchmark work; --benchmark_filter=REGEX picks cases:\n"
-      "memory.read, decide.*, apply.*, frame.*, sums.* (with --transport), rays.* (with --scene), "
+      "memory.read, haar.*, topk.*, apply.grey.*, apply.rgb.*, finish.*, sh.*, judge, raster.*, "
+      "decide.*, apply.*, frame.*, sums.* (with --transport), rays.* (with --scene), "
       "light.*, "
       "run.*"};
   std::string transport, environment, scene;
