@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/simd.h"
 
 namespace haarlight {
 namespace {
@@ -22,7 +23,18 @@ constexpr float kLargestRadiance = 1.8e18f;
 // difference.
 constexpr float kLeastCoefficient = 0x1p-100f;
 
-float without_traces(float c) { return std::abs(c) < kLeastCoefficient ? 0.0f : c; }
+// Copies `count` values, less than kLeastCoefficient as 0; whether all are at most `largest`, which
+// NaN and infinity are not.
+HAARLIGHT_MULTIVERSION bool take_values(const float* in, float* out, std::size_t count,
+                                        float largest) {
+  unsigned wrong = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const float size = std::abs(in[i]);
+    wrong |= static_cast<unsigned>(!(size <= largest));
+    out[i] = size < kLeastCoefficient ? 0.0f : in[i];
+  }
+  return wrong == 0;
+}
 
 constexpr std::pair<LightingMethod, const char*> kMethodNames[] = {
     {LightingMethod::nwa, "nwa"},
@@ -107,16 +119,15 @@ std::span<const Rgb> LightingTracker::take_in(std::span<const Rgb> target) {
                     layout_.size(), layout_.face_size(), layout_.face_size()));
   }
   const float largest = kLargestRadiance * static_cast<float>(layout_.face_size());
-  for (std::size_t i = 0; i < target.size(); ++i) {
-    const Rgb& c = target[i];
-    // NaN compares false.
-    if (!(std::abs(c.r) <= largest && std::abs(c.g) <= largest && std::abs(c.b) <= largest)) {
-      throw Error(ErrorKind::invalid_argument,
-                  fmt::format("target lighting coefficient {} is ({}, {}, {}), expected finite "
-                              "values up to {}",
-                              i, c.r, c.g, c.b, largest));
-    }
-    target_[i] = {without_traces(c.r), without_traces(c.g), without_traces(c.b)};
+  static_assert(sizeof(Rgb) == 3 * sizeof(float));
+  if (!take_values(&target[0].r, &target_[0].r, 3 * target.size(), largest)) {
+    const auto wrong = std::find_if(target.begin(), target.end(), [&](const Rgb& c) {
+      return !(std::abs(c.r) <= largest && std::abs(c.g) <= largest && std::abs(c.b) <= largest);
+    });
+    throw Error(ErrorKind::invalid_argument,
+                fmt::format("target lighting coefficient {} is ({}, {}, {}), expected finite "
+                            "values up to {}",
+                            wrong - target.begin(), wrong->r, wrong->g, wrong->b, largest));
   }
   return target_;
 }
