@@ -36,7 +36,7 @@ def reported(folder):
                 if item.get("name") == "property":
                     text = item.get("value")
                 elif item.get("name").startswith("figure_"):
-                    figures.append(tuple(item.get("value").split("|")))
+                    figures.append(tuple(item.get("value").rsplit("|", 3)))
             tests[name] = (text, figures)
     return tests
 
