@@ -2,7 +2,7 @@
 """Factored BRDFs: error against the number of terms, and pictures of the street against a path tracer.
 
   bench/view.py OUT_DIR --env A.exr --env B.exr [--bin build/bin] [--terms 4 16] [--samples 64]
-                [--width 320] [--height 200] [--images docs/images]
+                [--noise 0.02] [--paths 2048] [--width 320] [--height 200] [--images docs/images]
 
 Writes OUT_DIR/curve.csv and curve.png (relative L2 error of a BRDF over both hemispheres against K),
 makes haarlight-data's street with each number of terms, and writes pictures.csv: the relative RMSE of
@@ -103,6 +103,8 @@ def main():
     parser.add_argument("--env", action="append", default=[], help="environment; twice")
     parser.add_argument("--terms", type=int, nargs="+", default=[4, 16])
     parser.add_argument("--samples", type=int, default=64, help="paths a pixel")
+    parser.add_argument("--noise", type=float, default=0.02, help="of haarlight precompute")
+    parser.add_argument("--paths", type=int, default=2048, help="of haarlight precompute")
     parser.add_argument("--width", type=int, default=320)
     parser.add_argument("--height", type=int, default=200)
     parser.add_argument("--images", type=Path, help="folder for copies of the pictures")
@@ -124,7 +126,7 @@ def main():
     print("\n| BRDF | " + " | ".join(f"K = {k}" for k in columns) + " |")
     print("| --- |" + " --- |" * len(columns))
     for name, errors in by_material.items():
-        print(f"| {name} | " + " | ".join(f"{100 * errors[k]:.2g} %" for k in columns) + " |")
+        print(f"| {name} | " + " | ".join(f"{100 * errors[k]:.{0 if errors[k] >= 0.1 else 1}f} %" for k in columns) + " |")
 
     if options.env:
         scene = out / "street.glb"
@@ -136,6 +138,7 @@ def main():
             if not transport.exists():
                 run([options.bin / "haarlight", "precompute", scene, "-o", transport, "--vertices",
                      "--subdivide", "off", "--face", str(FACE), "--terms", str(k),
+                     "--noise", options.noise, "--paths", options.paths,
                      "--effects", "shadows,interreflection,gloss,color"])
             transports.append(transport)
         pictures = out / "pictures.csv"
@@ -150,8 +153,8 @@ def main():
         for row in all_rows:
             cells.setdefault((row["environment"], row["view"]), []).append(row)
         for (light, view), rows in cells.items():
-            errors = " | ".join(f"{100 * float(r['relative_rmse']):.2g} %" for r in rows)
-            print(f"| {light} | {view} | {errors} | {100 * float(rows[0]['reference_noise']):.2g} % |")
+            errors = " | ".join(f"{100 * float(r['relative_rmse']):.1f} %" for r in rows)
+            print(f"| {light} | {view} | {errors} | {100 * float(rows[0]['reference_noise']):.1f} % |")
         lights = [Path(e).stem for e in options.env]
         draw_strip(out, lights, options.terms, out / "strip.png")
 
