@@ -69,7 +69,8 @@ class Study:
         scene, path = os.path.join(self.out, "street.glb"), os.path.join(self.out, "street.hlt")
         if not os.path.exists(path):
             run(os.path.join(self.args.bin, "haarlight-data"), "scene", "street", "-o", scene)
-            run(self.haarlight, "precompute", scene, "--vertices", "--terms", 4, "--face", 32, "-o", path)
+            run(self.haarlight, "precompute", scene, "--vertices", "--terms", 4, "--face", 32,
+                "--effects", "shadows,gloss", "-o", path)
         return path
 
     def info(self, path):
