@@ -77,6 +77,42 @@ class BadInput : public testing::Test {
   fixtures::TemporaryFolder folder_;
 };
 
+TEST_F(BadInput, CompressWantsATransportOfVertices) {
+  expect_stated_error({"compress", "table.hlt", "-o", "c.hlt"},
+                      {"table.hlt", "one view", "--vertices"});
+  expect_stated_error({"compress", "room.exr", "-o", "c.hlt"}, {"room.exr", "not a Haarlight"});
+  expect_stated_error({"compress", "none.hlt", "-o", "c.hlt"}, {"none.hlt"});
+  ProgramResult result = run({"precompute", "table.obj", "-o", "mesh.hlt", "--vertices", "--face",
+                              "8", "--max-vertices", "300"});
+  ASSERT_EQ(result.code, 0) << result.err;
+  for (const auto& [option, value] :
+       std::vector<std::pair<std::string, std::string>>{{"--clusters", "0"},
+                                                        {"--clusters", "100000"},
+                                                        {"--clusters", "many"},
+                                                        {"--basis", "0"},
+                                                        {"--basis", "257"},
+                                                        {"--error", "0"},
+                                                        {"--weight-bits", "12"}}) {
+    result = run({"compress", "mesh.hlt", "-o", "c.hlt", option, value});
+    EXPECT_EQ(result.code, 2) << option << " " << value;
+    EXPECT_NE(result.err.find(option), std::string::npos) << result.err;
+  }
+  result = run({"compress", "mesh.hlt", "-o", "c.hlt", "--clusters", "4", "--basis", "5"});
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_NE(result.out.find("4 clusters"), std::string::npos) << result.out;
+  expect_stated_error({"compress", "c.hlt", "-o", "d.hlt"}, {"c.hlt", "compressed already"});
+  result = run({"info", "c.hlt"});
+  EXPECT_EQ(result.code, 0) << result.err;
+  EXPECT_NE(result.out.find("clusters"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("compressed from"), std::string::npos) << result.out;
+  result =
+      run({"relight", "c.hlt", "--env", "room.exr", "--frames", "4", "--stop", "2", "--size",
+           "32x24", "--basis-terms", "1", "--against-reference", "--orbit", "30", "-o", "out"});
+  EXPECT_EQ(result.code, 0) << result.err;
+  result = run({"relight", "c.hlt", "--env", "room.exr", "--basis-terms", "0", "-o", "out"});
+  EXPECT_EQ(result.code, 2) << result.err;
+}
+
 TEST_F(BadInput, GoodInputIsTaken) {
   // Else every other test here would pass for a program that refuses everything.
   const ProgramResult result = run(relight("table.hlt", "room.exr"));
