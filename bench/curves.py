@@ -160,7 +160,8 @@ class Study:
                     options += ["-o", folder, "--formats", "png", "--save-frames",
                                 ",".join(map(str, pictures))]
                 self.program("haarlight", "relight", transport, *options, *self.light_options(case))
-            self.note(f"{self.done + 1}/{self.planned} {case.key}{' (times)' if timed else ''}")
+            count = f"{self.done + 1}/{self.planned} " if self.planned else ""
+            self.note(f"{count}{case.key}{' (times)' if timed else ''}")
         self.done += 1
         with open(path, newline="") as f:
             rows = list(csv.DictReader(f))
@@ -206,13 +207,14 @@ class Study:
     def measure(self):
         cases = list(self.cases())
         # Times of reference and spherical harmonics are those of their only run.
-        self.planned = 2 * len(cases) + len(self.figure_cases()) + 4
+        self.planned = sum(1 if case.method.startswith("sh") else 2 for case in cases)
         table = []
         for case in cases:
             rows = self.run(case)
             timed = rows if case.method.startswith("sh") else self.run(case, timed=True)
             table.append(summary_of(case, rows, timed))
             write_csv(self.out / "summary.csv", table)
+        self.planned = 0  # what follows draws, and runs little
         return table
 
 
@@ -423,7 +425,8 @@ def draw_chosen(study, file):
     plt = pyplot()
     env = study.front()[1]
     frames = (30, 75, 125)
-    figure, axes = plt.subplots(3, 3, figsize=(12, 9), constrained_layout=True)
+    figure, axes = plt.subplots(3, 3, figsize=(12, 6.5), constrained_layout=True,
+                                gridspec_kw={"height_ratios": (1, 1, 2.4)})
     order = (1, 4, 0, 5)  # faces round the horizon: -X +Z +X -Z, in one row
     for column, frame in enumerate(frames):
         bars = {}
