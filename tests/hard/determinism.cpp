@@ -7,11 +7,14 @@
 #include <fstream>
 #include <functional>
 #include <iterator>
+#include <random>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "core/parallel.h"
+#include "cpca/cluster_relighter.h"
+#include "cpca/compress.h"
 #include "precompute/precompute.h"
 #include "precompute/precompute_mesh.h"
 #include "prt/image_relighter.h"
@@ -138,6 +141,30 @@ TEST(HardCases, Row49_ThreadsRelightFrames) {
             }),
             1);
   }
+}
+
+TEST(HardCases, Row49_ThreadsClusters) {
+  property("clustered PCA: the file, and frames relit from it, are the same bits on any threads");
+  const fixtures::SmallTransport small =
+      fixtures::small_mesh_transport(8, fixtures::bumpy_sphere(400, 45), 46);
+  const Transport transport = build_transport(small.info, small.tiles, small.thresholds);
+  at_most("hashes", hashes_of([&] {
+            const TemporaryFolder folder;
+            compress_transport(transport, folder / "a.hlt", {.clusters = 9, .basis = 6});
+            Hash hash;
+            hash.add(folder / "a.hlt");
+            ClusterRelighter relighter(Transport::open(folder / "a.hlt"));
+            LightingTracker tracker(transport.layout(), {});
+            std::mt19937_64 light(47);
+            for (int frame = 0; frame < 8; ++frame) {
+              const auto target = fixtures::random_lighting(transport.layout(), light);
+              relighter.apply(tracker.advance(target));
+              hash.add(relighter.picture());
+              hash.add(relighter.sums().data(), relighter.sums().size_bytes());
+            }
+            return hash.value();
+          }),
+          1);
 }
 
 }  // namespace

@@ -20,7 +20,9 @@ haarlight_hard_test(numbers SOURCES numbers_lighting numbers_basis numbers_float
 haarlight_hard_test(properties SOURCES properties USES haarlight_prt rapidcheck)
 haarlight_hard_test(long SOURCES long_run USES haarlight_prt)
 haarlight_hard_test(geometry SOURCES geometry_lobes geometry_rays USES haarlight_precompute)
-haarlight_hard_test(determinism SOURCES determinism USES haarlight_precompute XxHash::XxHash)
+haarlight_hard_test(determinism SOURCES determinism USES haarlight_precompute haarlight_cpca
+  XxHash::XxHash)
+haarlight_hard_test(clusters SOURCES clusters USES haarlight_cpca)
 haarlight_hard_test(factors SOURCES factors USES haarlight_precompute)
 
 haarlight_hard_test(files SOURCES files_damage files_models USES haarlight_fuzz_targets XxHash::XxHash)
