@@ -5,7 +5,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -17,7 +19,10 @@
 #include "data_gen/scenes.h"
 #include "precompute/default_stage.h"
 #include "precompute/precompute.h"
+#include "precompute/random.h"
+#include "precompute/surface.h"
 #include "precompute/tile_tracer.h"
+#include "prt/prior_lighting.h"
 
 namespace haarlight::bench {
 namespace {
@@ -73,6 +78,47 @@ LightSetup& setup() {
   return s;
 }
 
+Vec3 place_off(const Vec3& position, const Bsdf& b) {
+  return position + Visibility::kSurfaceOffset * b.geometric_normal;
+}
+
+// The light that one path brings under a sky of n x n faces.
+double plain_path(const LightSetup& s, const Receiver& receiver, const std::vector<float>& sky,
+                  int n, PathRandom& random, std::int64_t& rays) {
+  Vec3 from = place_off(receiver.position, receiver.bsdf);
+  Bsdf b = receiver.bsdf;
+  double weight = luminance(receiver.weight), sum = 0;
+  for (;;) {
+    const auto send = [&](const Vec3& w) {
+      return b.diffuse_in(w) * luminance(b.diffuse_out(b.to_viewer)) +
+             (b.has_lobe() ? b.lobe_values(w).first * luminance(b.gloss_first) : 0);
+    };
+    const double light_u = random.next(), light_v = random.next();
+    const Vec3 light = cosine_direction(b.normal, light_u, light_v);
+    if (dot(light, b.geometric_normal) > 0) {
+      const std::array<float, 3> origin{static_cast<float>(from.x), static_cast<float>(from.y),
+                                        static_cast<float>(from.z)};
+      ++rays;
+      if (!s.visibility->occluded(origin, light, std::numeric_limits<double>::infinity())) {
+        sum += weight * send(light) * kPi / dot(b.normal, light) *
+               static_cast<double>(sky[texel_of(light, n)]);
+      }
+    }
+    const double albedo = std::min(luminance(b.diffuse_albedo() + b.lobe_albedo()), 0.95);
+    if (!(random.next() < albedo)) return sum;
+    const double u = random.next(), v = random.next();
+    const Vec3 w = cosine_direction(b.normal, u, v);
+    if (!(dot(w, b.geometric_normal) > 0)) return sum;
+    weight *= send(w) * kPi / (dot(b.normal, w) * albedo);
+    ++rays;
+    const auto hit = surface_hit(s.scene, *s.visibility, from, w);
+    if (!hit) return sum;
+    b = bsdf_at(s.scene, *hit);
+    if (b.is_specular()) return sum;
+    from = place_off(hit->position, b);
+  }
+}
+
 // Tiles as a run traces them, wavelets included.
 void tiles(benchmark::State& state) {
   const LightSetup& s = setup();
@@ -117,6 +163,41 @@ void bare_paths(benchmark::State& state) {
   }
   state.SetItemsProcessed(rays);
   state.counters["record_mib"] = bytes / 1048576;
+}
+
+// What a renderer would do with one sky known beforehand: paths from the same receivers, at each
+// vertex one ray towards the light and one along the path, and what is needed to choose and weigh
+// them. No packets, no rows.
+void path_loop(benchmark::State& state) {
+  const LightSetup& s = setup();
+  constexpr int kPathsAReceiver = 64;
+  const int n = inputs().light_face;
+  const HaarLayout layout(n);
+  std::vector<float> sky(static_cast<std::size_t>(layout.size()));
+  haar_inverse(layout, prior_lightings(layout)[0], sky);
+  std::vector<TileReceivers> receivers(s.outputs.size());
+  for (std::size_t i = 0; i < receivers.size(); ++i) {
+    RayCounts counts;
+    s.tracer->find_receivers(s.outputs[i], receivers[i], counts);
+  }
+  std::vector<std::int64_t> rays(receivers.size());
+  std::vector<double> light(receivers.size());
+  std::int64_t sum = 0;
+  for (auto _ : state) {
+    parallel_for(static_cast<int>(receivers.size()), [&](int t) {
+      const auto at = static_cast<std::size_t>(t);
+      rays[at] = 0;
+      for (std::size_t r = 0; r < receivers[at].receivers.size(); ++r) {
+        for (int i = 0; i < kPathsAReceiver; ++i) {
+          PathRandom random(mix_bits(mix_bits(at, r), static_cast<std::uint64_t>(i)));
+          light[at] += plain_path(s, receivers[at].receivers[r], sky, n, random, rays[at]);
+        }
+      }
+    });
+    for (const std::int64_t count : rays) sum += count;
+  }
+  benchmark::DoNotOptimize(light.data());
+  state.SetItemsProcessed(sum);
 }
 
 // A folder of this process, gone at its end.
@@ -169,6 +250,7 @@ void register_full_light() {
   };
   add("light.tiles", tiles);
   add("light.bare.paths", bare_paths);
+  add("light.path.loop", path_loop);
   for (const bool everything : {false, true}) {
     for (const int threads : {1, 2}) {
       add(fmt::format("run.{}.t{}", everything ? "full" : "direct", threads),

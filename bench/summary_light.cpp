@@ -23,6 +23,11 @@ void Collector::print_light() const {
         "  full light: {:.1f} M rays/s, {:.0f} % of a bare loop over the same rays at {:.1f} M/s "
         "(wanted 60 % or more: {})\n",
         rate, 100 * ratio, bare->counters.at("items_per_second") / 1e6, verdict(ratio >= 0.6));
+    if (const Case* loop = find("light.path.loop")) {
+      const double theirs = loop->counters.at("items_per_second") / 1e6;
+      fmt::print("  full light: {:.2f} times the rays of a plain path loop at {:.1f} M/s\n",
+                 rate / theirs, theirs);
+    }
   }
   for (const char* kind : {"direct", "full"}) {
     const Case* one = find(fmt::format("run.{}.t1", kind));

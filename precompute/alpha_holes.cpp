@@ -30,7 +30,9 @@ void AlphaHoles::add(const Scene& scene, const Triangle& triangle) {
   Piece piece;
   piece.surface = static_cast<std::uint32_t>(number);
   for (std::size_t c = 0; c < 3 && !scene.uv.empty(); ++c) {
-    piece.uv[c] = scene.uv[triangle.vertex[c]];
+    const TextureMap& map = scene.material[triangle.material].map;
+    const auto [u, v] = texture_place(scene, triangle.vertex[c], map);
+    piece.uv[c] = {static_cast<float>(u), static_cast<float>(v)};
   }
   pieces_.push_back(piece);
 }

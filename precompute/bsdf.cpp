@@ -216,6 +216,20 @@ bool has_single_directions(const Material& material) {
   return true;
 }
 
+bool may_have_narrow_lobe(const Material& material) {
+  if (has_single_directions(material)) return false;
+  switch (material.model) {
+    case SurfaceModel::phong:
+      return l1_norm(RgbD(material.specular)) > 0 && material.exponent > 80;
+    case SurfaceModel::metallic_roughness:
+      return material.roughness < 0.5f || material.metallic_roughness_texture >= 0;
+    case SurfaceModel::mirror:
+    case SurfaceModel::glass:
+      break;
+  }
+  return false;
+}
+
 Bsdf bsdf_at(const Scene& scene, const SurfaceHit& hit) {
   const Material& material = scene.material[hit.material];
   Bsdf b;

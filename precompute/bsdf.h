@@ -118,6 +118,11 @@ inline constexpr float kMirrorRoughness = 0.03f;
 /// transmission, smooth metallic_roughness.
 bool has_single_directions(const Material& material);
 
+/// Whether a surface of this material, without single directions, may have a lobe so narrow that
+/// light by way of it is best looked for: GGX below a roughness of 0.5, Phong above an exponent of
+/// 80 (half widths of about 0.1 radians, at grazing for GGX).
+bool may_have_narrow_lobe(const Material& material);
+
 /// The BSDF of what a ray has met.
 Bsdf bsdf_at(const Scene& scene, const SurfaceHit& hit);
 

@@ -73,6 +73,7 @@ void add_ground(Scene& scene, const Bounds& bounds, const StageOptions& options)
     scene.position.push_back({m.x + x * half, bounds.low.y, m.z + z * half});
     scene.normal.push_back({0, 1, 0});
     scene.uv.push_back({0, 0});
+    if (!scene.uv2.empty()) scene.uv2.push_back({0, 0});
     if (!scene.tint.empty()) scene.tint.push_back({1, 1, 1});
   }
   Material material;

@@ -99,6 +99,14 @@ DirectionTable::DirectionTable(int face_size, int samples_per_texel)
     }
   }
 
+  for (std::size_t s = 0; s < per_texel; ++s) {
+    for (std::size_t k = 0; k < count; ++k) {
+      const Sample& d = sample[k * per_texel + s];
+      plane_x.push_back(d.x), plane_y.push_back(d.y), plane_z.push_back(d.z);
+      plane_solid_angle.push_back(d.solid_angle);
+    }
+  }
+
   const int side = std::min(n, 8);
   for (int face = 0; face < 6; ++face) {
     for (int gy = 0; gy < n; gy += side) {

@@ -53,6 +53,8 @@ struct DirectionTable {
   int n = 0;
   int samples = 0;
   std::vector<Sample> sample;  ///< [texel][sample]
+  /// The same as [sample][texel], an array a number.
+  std::vector<float> plane_x, plane_y, plane_z, plane_solid_angle;
   std::vector<Packet> packet;
   std::vector<Group> group;
   /// Per texel: sum of direction * solid angle over its samples. Dotted with a normal it is the

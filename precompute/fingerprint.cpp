@@ -19,6 +19,10 @@ void add_material(ContentHash& hash, const Material& m) {
     hash.add_all(m.measured->value);
   }
   hash.add(m.normal_texture), hash.add(m.normal_scale), hash.add(m.alpha_cutoff);
+  for (const TextureMap& map : {m.map, m.metallic_roughness_map, m.normal_map}) {
+    hash.add(map.second);
+    for (const float x : map.matrix) hash.add(x);
+  }
 }
 
 }  // namespace
@@ -27,6 +31,7 @@ void add_scene(ContentHash& hash, const Scene& scene) {
   hash.add_all(scene.position);
   hash.add_all(scene.normal);
   hash.add_all(scene.uv);
+  hash.add_all(scene.uv2);
   hash.add_all(scene.tint);
   hash.add(scene.triangle.size());
   for (const Triangle& t : scene.triangle) {

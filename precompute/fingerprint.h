@@ -11,7 +11,7 @@
 namespace haarlight {
 
 /// Raised whenever the same input would give other rows; part of every fingerprint.
-inline constexpr int kTracerVersion = 2;
+inline constexpr int kTracerVersion = 3;
 
 void add_scene(ContentHash& hash, const Scene& scene);
 void add_camera(ContentHash& hash, const Camera& camera);

@@ -2,6 +2,7 @@
 
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
@@ -28,8 +29,11 @@ class GlossyLobe {
   /// entries.
   void weights(std::size_t texel, std::span<float> first, std::span<float> second) const;
 
-  /// Integrals over the whole texel. A GGX lobe many texels wide is evaluated once for it.
-  Bsdf::LobeValues whole(std::size_t texel, std::span<float> first, std::span<float> second) const;
+  /// Integrals over whole texels [begin, begin + count), count a multiple of eight: into `first`
+  /// and `second` where bit i of `wanted` is set, at most 64. The spans are working memory as for
+  /// weights(). A GGX lobe many texels wide is evaluated once a texel.
+  void whole(std::size_t begin, std::size_t count, std::uint64_t wanted, float* first,
+             float* second, std::span<float> first_weights, std::span<float> second_weights) const;
 
  private:
   const DirectionTable& table_;

@@ -32,11 +32,41 @@ Rgb unit_rgb(const json& object, const char* key) {
   return {unit(number(c.at(0), 1)), unit(number(c.at(1), 1)), unit(number(c.at(2), 1))};
 }
 
+// How texture `key` of `object` lies. Both of glTF's axes start at the top left, so that with v' =
+// 1 - v the rows
+//   u_t = sx cos u + sy sin v' + tx,   v'_t = -sx sin u + sy cos v' + ty
+// of KHR_texture_transform become those below. Of coordinates beyond the second, the first are
+// used.
+TextureMap read_map(const json& object, const char* key) {
+  TextureMap map;
+  if (!object.contains(key)) return map;
+  const json& texture = object.at(key);
+  double set = number(texture, "texCoord", 0);
+  if (texture.contains("extensions") &&
+      texture.at("extensions").contains("KHR_texture_transform")) {
+    const json& t = texture.at("extensions").at("KHR_texture_transform");
+    set = number(t, "texCoord", set);
+    const auto pair = [&](const char* name, std::size_t i, double fallback) {
+      return t.contains(name) ? number(t.at(name).at(i), fallback) : fallback;
+    };
+    const double angle = number(t, "rotation", 0), c = std::cos(angle), s = std::sin(angle);
+    const double sx = pair("scale", 0, 1), sy = pair("scale", 1, 1);
+    const double rows[6] = {sx * c, -sy * s, sy * s + pair("offset", 0, 0),
+                            sx * s, sy * c,  1 - sy * c - pair("offset", 1, 0)};
+    std::transform(rows, rows + 6, map.matrix.begin(),
+                   [](double x) { return static_cast<float>(x); });
+  }
+  map.second = set == 1;
+  return map;
+}
+
 void read_surface(const json& pbr, GltfMaterial& out) {
   out.base = unit_rgb(pbr, "baseColorFactor");
   if (pbr.contains("baseColorFactor") && pbr.at("baseColorFactor").size() > 3) {
     out.alpha = unit(number(pbr.at("baseColorFactor").at(3), 1));
   }
+  out.base_map = read_map(pbr, "baseColorTexture");
+  out.metallic_roughness_map = read_map(pbr, "metallicRoughnessTexture");
   out.metallic = unit(pbr, "metallicFactor", 1);
   out.roughness = unit(pbr, "roughnessFactor", 1);
 }
@@ -80,6 +110,7 @@ GltfMaterial read_material(const json& material) {
   if (material.contains("pbrMetallicRoughness")) {
     read_surface(material.at("pbrMetallicRoughness"), out);
   }
+  out.normal_map = read_map(material, "normalTexture");
   if (material.contains("normalTexture")) {
     out.normal_scale = static_cast<float>(number(material.at("normalTexture"), "scale", 1));
   }

@@ -1,4 +1,4 @@
-// The numbers of glTF materials, from the JSON. Textures are the scene reader's.
+// The numbers of glTF materials, from the JSON. Pictures are the scene reader's.
 
 #pragma once
 
@@ -7,17 +7,19 @@
 #include <vector>
 
 #include "core/rgb.h"
+#include "precompute/scene.h"
 
 namespace haarlight {
 
 /// One material as glTF 2.0, section 3.9, has it, with KHR_materials_ior, _transmission and
-/// _volume. Everything is within its bounds: what is missing, no number or not finite has its
-/// default.
+/// _volume, and KHR_texture_transform. Everything is within its bounds: what is missing, no number
+/// or not finite has its default.
 struct GltfMaterial {
   Rgb base{1, 1, 1};
   float alpha = 1;  ///< of the base colour
   float metallic = 1, roughness = 1;
   float normal_scale = 1;
+  TextureMap base_map, metallic_roughness_map, normal_map;  ///< see precompute/scene.h: v runs up
   enum class Alpha { opaque, mask, blend };
   Alpha alpha_mode = Alpha::opaque;
   float alpha_cutoff = 0.5f;

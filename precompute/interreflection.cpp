@@ -3,8 +3,11 @@
 #include "precompute/interreflection.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
+#include <optional>
 
 #include "precompute/connections.h"
 #include "precompute/path_sums.h"
@@ -15,7 +18,7 @@
 namespace haarlight {
 namespace {
 
-constexpr int kFollowOneIn = 4;  // of a vertex' directions that mirrors or glass block
+constexpr int kFollowOneIn = 4;  // of a vertex' directions that what is followed blocks
 
 enum Part : unsigned { kDiffuse = 1, kLobe = 2, kDelta = 4, kAllParts = 7 };
 
@@ -95,6 +98,13 @@ class Interreflection::Paths {
 
   // Paths [first, first + kPathBatch) of each kind.
   void trace(int first) {
+    if (follows_lobes() && has_diffuse()) {
+      for (part_ = 0; part_ < PathSums::kParts; ++part_) {
+        for (std::size_t l = 0; l < tile_.receivers.size(); ++l) {
+          follow_lobes(l, first / kPathBatch * PathSums::kParts + part_);
+        }
+      }
+    }
     for (int i = 0; i < kPathBatch; ++i) {
       part_ = i * PathSums::kParts / kPathBatch;
       if (has_diffuse()) start_diffuse(static_cast<std::uint64_t>(first + i));
@@ -110,12 +120,79 @@ class Interreflection::Paths {
   bool has_diffuse() const { return s_.connections.chances().total() > 0; }
   bool has_lobes() const { return s_.lobes.total() > 0; }
 
+  // Whether light by way of narrow lobes is looked for.
+  bool follows_lobes() const { return o_.effects_.gloss && o_.visibility_.has_glossy(); }
+  bool follows_specular() const { return o_.effects_.caustics && o_.visibility_.has_specular(); }
+  // Whether a place is of the surfaces that are looked for.
+  bool is_followed(const SurfaceHit& y, const Bsdf& b) const {
+    return b.has_lobe() && b.lobe_half_width() < o_.narrow_ &&
+           may_have_narrow_lobe(o_.scene_.material[y.material]);
+  }
+
+  // One direction of y's narrow lobe, with its share of the lobe, if it leads out of the scene.
+  struct Glint {
+    Vec3 direction;
+    RgbD weight;
+  };
+  std::optional<Glint> glint(const SurfaceHit& y, const Bsdf& b, PathRandom& random) {
+    const double u = random.next(), v = random.next();
+    const auto sample = b.sample_lobe(u, v);
+    if (!sample || !(dot(sample->direction, b.geometric_normal) > 0)) return std::nullopt;
+    const Vec3 from = leave_surface(y, sample->direction);
+    const std::array<float, 3> start{static_cast<float>(from.x), static_cast<float>(from.y),
+                                     static_cast<float>(from.z)};
+    ++counts_.shadow;
+    if (o_.visibility_.occluded(start, sample->direction,
+                                std::numeric_limits<double>::infinity())) {
+      return std::nullopt;
+    }
+    return Glint{sample->direction, lobe_color(b, sample->direction) * (1 / sample->pdf)};
+  }
+
+  // What narrow lobes that receiver l sees by diffuse reflection, or by a wide lobe of its own,
+  // send it from the open: paths would find them by chance only, and each with much light. Estimate
+  // `number` of as many as there are parts of batches, by one phase of the sky.
+  void follow_lobes(std::size_t l, int number) {
+    const Receiver& r = tile_.receivers[l];
+    if (!(s_.connections.chances().of(l) > 0)) return;
+    const SparseDirections& directions = o_.sky_.directions();
+    PathRandom random(mix_bits(mix_bits(o_.seed_ + 4, l), static_cast<std::uint64_t>(number)));
+    const auto phases = static_cast<std::uint64_t>(o_.sky_.phases());
+    const auto phase =
+        static_cast<int>((mix_bits(o_.seed_ + 5, l) + static_cast<std::uint64_t>(number)) % phases);
+    const int place = static_cast<int>(random.next() * directions.places());
+    const SparseDirections::Packet* packets = directions.packets(phase, place);
+    s_.view.look(o_.visibility_, origin(r), r.bsdf, packets, directions.slots() / 8, counts_.bounce,
+                 Visibility::kGlossy);
+    std::int32_t path = -1;
+    for (std::uint64_t left = s_.view.blocked(); left != 0; left &= left - 1) {
+      const auto p = static_cast<std::size_t>(std::countr_zero(left));
+      for (unsigned bits = s_.view.blocked_lanes(p); bits != 0; bits &= bits - 1) {
+        const auto i = static_cast<unsigned>(std::countr_zero(bits));
+        const Vec3 w = vec(packets[p].x[i], packets[p].y[i], packets[p].z[i]);
+        ++counts_.bounce;
+        const auto hit = surface_hit(o_.scene_, o_.visibility_, origin(r), w);
+        if (!hit) continue;
+        const Bsdf b = bsdf_at(o_.scene_, *hit);
+        if (!is_followed(*hit, b)) continue;
+        const auto sent = glint(*hit, b, random);
+        if (!sent) continue;
+        const double cosine = dot(r.bsdf.normal, w);
+        const RgbD seen = r.weight * over_cosine(r.bsdf, w) *
+                          (cosine / kPi * static_cast<double>(packets[p].weight[i]));
+        // Each part stands for its share of the batch's paths.
+        if (path < 0) path = new_path(r.row, RgbD{1, 1, 1} * (kPathBatch / PathSums::kParts));
+        deposit(path, sent->direction, seen * sent->weight);
+      }
+    }
+  }
+
   std::int32_t new_path(std::size_t row, const RgbD& own) {
-    ++counts_.paths, ++random_key_;
+    ++counts_.paths, ++path_key_;
     return s_.sums.add_path(part_, row, own);
   }
   std::int32_t new_shared_path() {
-    ++counts_.paths, ++random_key_;
+    ++counts_.paths, ++path_key_;
     return s_.sums.add_shared_path(part_);
   }
 
@@ -144,7 +221,7 @@ class Interreflection::Paths {
       Bsdf at_end = end.bsdf;
       apply_effects(o_.effects_, at_end);
       walk(new_path(row, alone * end.weight), *end.hit, at_end, kAllParts, {1, 1, 1}, 1, false,
-           random);
+           false, random);
       return;
     }
     if (b.has_diffuse() || shares_lobe(b)) {
@@ -153,17 +230,17 @@ class Interreflection::Paths {
     if (b.has_diffuse()) {
       const std::int32_t path = new_shared_path();
       s_.connections.add_diffuse(b, s_.sums.weights(path));
-      walk(path, *hit, b, kDiffuse, {1, 1, 1}, 1, false, random);
+      walk(path, *hit, b, kDiffuse, {1, 1, 1}, 1, false, false, random);
     }
     unsigned rest = kLobe | kDelta;
     if (shares_lobe(b) && s_.connections.sees(l)) {
       const std::int32_t path = new_shared_path();
       s_.connections.add_lobe(l, s_.sums.weights(path));
-      walk(path, *hit, b, kLobe, {1, 1, 1}, 1, false, random);
+      walk(path, *hit, b, kLobe, {1, 1, 1}, 1, false, false, random);
       rest = kDelta;
     }
     if ((b.has_lobe() && (rest & kLobe) != 0) || b.delta_count > 0) {
-      walk(new_path(row, alone), *hit, b, rest, {1, 1, 1}, 1, false, random);
+      walk(new_path(row, alone), *hit, b, rest, {1, 1, 1}, 1, false, follows_lobes(), random);
     }
   }
 
@@ -194,18 +271,20 @@ class Interreflection::Paths {
       b = end.bsdf;
       apply_effects(o_.effects_, b);
     }
-    walk(new_path(r.row, weight), at, b, kAllParts, {1, 1, 1}, 1, false, random);
+    walk(new_path(r.row, weight), at, b, kAllParts, {1, 1, 1}, 1, false, false, random);
   }
 
   // From vertex y, number `bounce` of the path, along the path. `parts` of y's BSDF count. Shared
   // paths have y's diffuse colour in their base weights already. Light that comes straight to y by
   // its single directions counts only where `alone`: otherwise whoever looked this way has followed
-  // them already.
+  // them already. `looked`: whoever looked this way has followed y's narrow lobe into the open,
+  // too.
   void walk(std::int32_t path, SurfaceHit y, Bsdf b, unsigned parts, RgbD tint, int bounce,
-            bool alone, PathRandom& random) {
+            bool alone, bool looked, PathRandom& random) {
     bool in_base = s_.sums.is_shared(path);
     for (;;) {
       const bool narrow = b.has_lobe() && b.lobe_half_width() < o_.narrow_;
+      const bool followed = looked && is_followed(y, b);  // its lobe into the open
       const RgbD out = in_base ? RgbD{1, 1, 1} : b.diffuse_out(b.to_viewer);
       const bool diffuse = (parts & kDiffuse) != 0 && b.has_diffuse();
       const bool lobe = (parts & kLobe) != 0 && b.has_lobe();
@@ -251,7 +330,7 @@ class Interreflection::Paths {
         b = end.bsdf;
         apply_effects(o_.effects_, b);
         parts = kAllParts;
-        in_base = false;
+        in_base = looked = false;
         continue;  // the same bounce: nothing was scattered
       }
       in_base = false;
@@ -259,7 +338,7 @@ class Interreflection::Paths {
       ++counts_.bounce;
       const auto next = surface_hit(o_.scene_, o_.visibility_, leave_surface(y, w), w);
       if (!next) {
-        if (sampled_alone) deposit(path, w, tint);
+        if (sampled_alone && !followed) deposit(path, w, tint);
         return;
       }
       y = *next;
@@ -267,6 +346,7 @@ class Interreflection::Paths {
       const bool specular = b.is_specular();
       apply_effects(o_.effects_, b);
       alone = sampled_alone;
+      looked = follows_lobes() && !sampled_alone;
       parts = kAllParts;
       if (specular) {
         if (b.delta_count == 0) return;
@@ -278,6 +358,7 @@ class Interreflection::Paths {
           if (sampled_alone) deposit(path, end.direction, tint);
           return;
         }
+        looked = false;
         y = *end.hit;
         b = end.bsdf;
         apply_effects(o_.effects_, b);
@@ -301,7 +382,8 @@ class Interreflection::Paths {
     phase_ = -1;
     const int place = static_cast<int>(random.next() * directions.places());
     const SparseDirections::Packet* packets = directions.packets(phase, place);
-    s_.view.look(o_.visibility_, y, b, packets, directions.slots() / 8, counts_);
+    const Vec3 from = y.position + Visibility::kSurfaceOffset * y.geometric_normal;
+    s_.view.look(o_.visibility_, from, b, packets, directions.slots() / 8, counts_.shadow);
     if (s_.view.open() != 0 && diffuse) {
       const std::size_t column = s_.sums.add_column(path, phase, tint * out, s_.view.open());
       s_.view.diffuse(b, s_.sums.values(column));
@@ -316,41 +398,62 @@ class Interreflection::Paths {
       s_.sums.close_column(column);
       if (both) s_.sums.close_column(column + 1);
     }
-    if (o_.effects_.caustics && o_.visibility_.has_specular() && s_.view.blocked() != 0) {
+    if (s_.view.blocked() != 0 && (follows_lobes() || follows_specular())) {
       const std::uint64_t key =
-          mix_bits(o_.seed_ + 3, random_key_ * 64 + static_cast<std::uint64_t>(place));
-      follow_blocked(path, y, b, diffuse, lobe, out, tint, packets, key);
+          mix_bits(o_.seed_ + 3, path_key_ * 64 + static_cast<std::uint64_t>(place));
+      const RgbD diffuse_out = diffuse ? tint * out : RgbD{};
+      follow_blocked(path, from, b, diffuse_out, lobe ? tint : RgbD{}, packets, key);
     }
   }
 
-  // Some of the directions that mirrors or glass block, through them.
-  void follow_blocked(std::int32_t path, const SurfaceHit& y, const Bsdf& b, bool diffuse,
-                      bool lobe, const RgbD& out, const RgbD& tint,
-                      const SparseDirections::Packet* packets, std::uint64_t key) {
-    const Vec3 from = y.position + Visibility::kSurfaceOffset * y.geometric_normal;
+  // Some of the directions that mirrors, glass or narrow lobes block, by way of them. `diffuse` and
+  // `lobe` are what the parts of the BSDF are multiplied with.
+  void follow_blocked(std::int32_t path, const Vec3& from, const Bsdf& b, const RgbD& diffuse,
+                      const RgbD& lobe, const SparseDirections::Packet* packets,
+                      std::uint64_t key) {
+    const unsigned surfaces = (follows_lobes() ? Visibility::kGlossy : 0u) |
+                              (follows_specular() ? Visibility::kSpecular : 0u);
+    const std::array<float, 3> start{static_cast<float>(from.x), static_cast<float>(from.y),
+                                     static_cast<float>(from.z)};
     for (std::uint64_t left = s_.view.blocked(); left != 0; left &= left - 1) {
       const auto p = static_cast<std::size_t>(std::countr_zero(left));
-      for (unsigned bits = s_.view.blocked_lanes(p); bits != 0; bits &= bits - 1) {
+      const SparseDirections::Packet& d = packets[p];
+      const unsigned blocked = s_.view.blocked_lanes(p);
+      counts_.specular += std::popcount(blocked);
+      const unsigned met = o_.visibility_.occluded8(start, d.x, d.y, d.z, blocked,
+                                                    static_cast<Visibility::Surfaces>(surfaces));
+      for (unsigned bits = met; bits != 0; bits &= bits - 1) {
         const auto i = static_cast<unsigned>(std::countr_zero(bits));
         PathRandom chance(mix_bits(key, 8 * p + i));
         if (chance.next() * kFollowOneIn >= 1) continue;
-        const Vec3 w = vec(packets[p].x[i], packets[p].y[i], packets[p].z[i]);
+        const Vec3 w = vec(d.x[i], d.y[i], d.z[i]);
         ++counts_.specular;
         const auto hit = surface_hit(o_.scene_, o_.visibility_, from, w);
         if (!hit) continue;
-        const Bsdf met = bsdf_at(o_.scene_, *hit);
-        if (met.delta_count == 0) continue;
-        const PathEnd end = follow_specular(o_.scene_, o_.visibility_, *hit, met, AtMixed::pass,
-                                            chance, counts_.specular);
-        if (end.hit || !(luminance(end.weight) > 0)) continue;
-        RgbD through;
-        if (diffuse) through += out * b.diffuse_in(w);
-        if (lobe) through += lobe_color(b, w);
-        deposit(path, end.direction,
-                tint * through * end.weight *
-                    (static_cast<double>(packets[p].weight[i]) * kFollowOneIn));
+        Glint sent;
+        if (!follow(*hit, chance, sent)) continue;
+        RgbD through = diffuse * b.diffuse_in(w);
+        if (l1_norm(lobe) > 0) through += lobe * lobe_color(b, w);
+        deposit(path, sent.direction,
+                through * sent.weight * (static_cast<double>(d.weight[i]) * kFollowOneIn));
       }
     }
+  }
+
+  // What comes from the open by way of `hit`: through mirrors and glass, or by a narrow lobe.
+  bool follow(const SurfaceHit& hit, PathRandom& random, Glint& sent) {
+    const Bsdf met = bsdf_at(o_.scene_, hit);
+    if (met.delta_count > 0) {
+      if (!follows_specular()) return false;
+      const PathEnd end = follow_specular(o_.scene_, o_.visibility_, hit, met, AtMixed::pass,
+                                          random, counts_.specular);
+      sent = {end.direction, end.weight};
+      return !end.hit && luminance(end.weight) > 0;
+    }
+    if (!follows_lobes() || !is_followed(hit, met)) return false;
+    const auto found = glint(hit, met, random);
+    if (found) sent = *found;
+    return found.has_value();
   }
 
   const Interreflection& o_;
@@ -359,8 +462,8 @@ class Interreflection::Paths {
   RayCounts& counts_;
   double shift_[4], lobe_shift_[4];
   int part_ = 0;
-  int phase_ = -1;  // of the path's first vertex, evenly spread over paths; -1: random
-  std::uint64_t random_key_ = 0;  // counts paths: whose directions are followed
+  int phase_ = -1;              // of the path's first vertex, evenly spread over paths; -1: random
+  std::uint64_t path_key_ = 0;  // counts paths
 };
 
 Interreflection::Interreflection(const Scene& scene, const Visibility& visibility,

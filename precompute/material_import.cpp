@@ -114,6 +114,9 @@ Material import_gltf_material(const GltfMaterial& numbers, const aiMaterial& in,
   }
   out.normal_texture = textures.index(texture_path(in, aiTextureType_NORMALS), ImageEncoding::data);
   out.normal_scale = numbers.normal_scale;
+  out.map = numbers.base_map;
+  out.metallic_roughness_map = numbers.metallic_roughness_map;
+  out.normal_map = numbers.normal_map;
 
   if (numbers.transmission > 0 && numbers.roughness >= kMirrorRoughness) ++report.rough_glass;
   if (numbers.has_inside && numbers.transmission >= kMostly && numbers.metallic < kMostly) {

@@ -23,7 +23,8 @@ void PathSums::begin(const IndirectSky& sky) {
   paths_.clear(), lights_.clear(), bases_.clear(), columns_.clear(), deposits_.clear();
   first_of_batch_ = 0;
   sums_.assign(kOut * sky.row_size(), 0.0f);
-  deposited_.clear();
+  deposit_at_.assign(static_cast<std::size_t>(sky.layout().size()), 0);
+  deposit_texel_.clear(), deposited_.clear();
   direct_.assign(light_count_ * kOut, 0.0f);
   sum_.assign(light_count_ * kOut, 0.0);
   square_.assign(light_count_ * kOut, 0.0);
@@ -177,30 +178,32 @@ void PathSums::apply() {
 }
 
 void PathSums::apply_deposits() {
-  if (deposits_.empty()) return;
-  const auto texels = static_cast<std::size_t>(sky_->layout().size());
-  if (deposited_.empty()) deposited_.assign(kOut * texels, 0.0f);
   for (const Deposit& d : deposits_) {
-    const Path& path = paths_[at(d.path)];
-    float* sum = deposited_.data() + d.texel;
-    if (path.row != kShared) {
-      for (std::size_t c = 0; c < 3; ++c) {
-        sum[(c * kRows + static_cast<std::size_t>(path.row)) * texels] +=
-            channel(path.own * d.tint, c);
-      }
-      continue;
+    std::uint32_t& place = deposit_at_[d.texel];
+    if (place == 0) {
+      deposit_texel_.push_back(d.texel);
+      deposited_.resize(deposited_.size() + kOut, 0.0f);
+      place = static_cast<std::uint32_t>(deposit_texel_.size());
     }
-    const float* base = weights(d.path);
-    for (std::size_t m = 0; m < kOut; ++m) sum[m * texels] += base[m] * channel(d.tint, m / kRows);
+    const Path& path = paths_[at(d.path)];
+    float* sum = deposited_.data() + (std::size_t{place} - 1) * kOut;
+    const float* base = path.row == kShared ? weights(d.path) : nullptr;
+    for (std::size_t c = 0; c < 3; ++c, sum += kRows) {
+      const float tint = channel(d.tint, c);
+      if (!base) {
+        sum[path.row] += channel(path.own, c) * tint;
+        continue;
+      }
+      for (std::size_t row = 0; row < kRows; ++row) sum[row] += tint * base[c * kRows + row];
+    }
   }
 }
 
 void PathSums::add_to(std::size_t out, float scale, float* texels) const {
   sky_->add_sums(sums_.data() + out * sky_->row_size(), scale, texels);
-  if (deposited_.empty()) return;
-  const auto size = static_cast<std::size_t>(sky_->layout().size());
-  const float* of = deposited_.data() + out * size;
-  for (std::size_t k = 0; k < size; ++k) texels[k] += scale * of[k];
+  for (std::size_t place = 0; place < deposit_texel_.size(); ++place) {
+    texels[deposit_texel_[place]] += scale * deposited_[place * kOut + out];
+  }
 }
 
 }  // namespace haarlight

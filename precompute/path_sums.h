@@ -91,8 +91,10 @@ class PathSums {
   std::vector<Column> columns_;
   std::vector<float> values_;  // [column][slot]
   std::vector<Deposit> deposits_;
-  std::vector<float> sums_;       // [kOut][phase][slot]
-  std::vector<float> deposited_;  // [kOut][texel]; empty until there is any
+  std::vector<float> sums_;                 // [kOut][phase][slot]
+  std::vector<std::uint32_t> deposit_at_;   // of a texel: one more than its place, or 0: none yet
+  std::vector<std::size_t> deposit_texel_;  // of a place
+  std::vector<float> deposited_;            // [place][kOut]
   // Of judging, [light][kOut].
   std::vector<float> direct_, part_sum_;
   std::vector<double> sum_, square_;

@@ -356,27 +356,25 @@ void PointTracer::trace(const ShadingPoint& point, const PointRow& row, PointScr
       row.diffuse[k] = (sure >> (k % 64) & 1) ? whole : 0.0f;
     }
     if (!lobe) continue;
-    for (std::uint64_t bits = sure; bits != 0; bits &= bits - 1) {
-      const std::size_t k = 64 * w + static_cast<std::size_t>(std::countr_zero(bits));
-      if (!lobe->reaches(k)) continue;
-      const Bsdf::LobeValues v = lobe->whole(k, scratch.first_weights, scratch.second_weights);
-      row.first[k] = static_cast<float>(v.first);
-      row.second[k] = static_cast<float>(v.second);
-    }
+    lobe->whole(64 * w, end - 64 * w, sure, row.first.data() + 64 * w, row.second.data() + 64 * w,
+                scratch.first_weights, scratch.second_weights);
   }
   refine(point, lobe ? &*lobe : nullptr, row, scratch, counts);
 
   if (point.bsdf.coat_f0 > 0) {  // changes slowly: once a texel
-    const auto samples = static_cast<std::size_t>(table_.samples);
+    const float least = 1e-3f;   // near the horizon the middle of a texel may lie below it
+    const float share =
+        point.bsdf.coat_pass > 1e-9 ? static_cast<float>(1 / point.bsdf.coat_pass) : 0;
+    const FloatVec up(point.normal);
+    scratch.coat.clear();
+    const std::int32_t coat = scratch.coat.add(point.bsdf);
+    scratch.pass.resize(table_.texels());
     for (std::size_t k = 0; k < table_.texels(); ++k) {
-      if (row.diffuse[k] == 0) continue;
-      const DirectionTable::Sample& d = table_.sample[k * samples];
-      const Vec3 w{static_cast<double>(d.x), static_cast<double>(d.y), static_cast<double>(d.z)};
-      const double cosine = std::max(dot(point.normal, w), 1e-3);
-      const Vec3 above = w + (cosine - dot(point.normal, w)) * point.normal;
-      row.diffuse[k] *=
-          static_cast<float>(point.bsdf.diffuse_in(above) * kPi / dot(point.normal, above));
+      scratch.pass[k] =
+          std::max(least, up.dot(table_.plane_x[k], table_.plane_y[k], table_.plane_z[k]));
     }
+    scratch.coat.passing(coat, scratch.pass.data(), table_.texels(), scratch.pass.data());
+    for (std::size_t k = 0; k < table_.texels(); ++k) row.diffuse[k] *= share * scratch.pass[k];
   }
   if (lobe && lobe->is_narrow() && row.deposits) draw_lobe(point, *row.deposits, counts);
 }

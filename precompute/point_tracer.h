@@ -9,6 +9,7 @@
 
 #include "core/vec.h"
 #include "precompute/direction_table.h"
+#include "precompute/lobe_lanes.h"
 #include "precompute/receiver.h"
 #include "precompute/scene.h"
 #include "precompute/visibility.h"
@@ -58,6 +59,8 @@ struct PointScratch {
   std::vector<float> first_weights, second_weights;
   std::vector<float> turns;   // cosines and sines of multiples of an angle
   std::vector<float> second;  // for callers that do not want it
+  CoatTables coat;
+  std::vector<float> pass;
 };
 
 /// Where the parts of a row go; each of table.texels() entries, replaced.

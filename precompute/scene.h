@@ -27,6 +27,14 @@ enum class SurfaceModel {
   measured             ///< a table; see Material::measured
 };
 
+/// How a texture lies on a surface: its (u, v) are the rows of `matrix` times (u, v, 1), u and v of
+/// a vertex' first or second coordinates.
+struct TextureMap {
+  bool second = false;
+  std::array<float, 6> matrix{1, 0, 0, 0, 1, 0};
+  bool operator==(const TextureMap&) const = default;
+};
+
 /// phong: f_r = albedo / pi + specular (e + 2) / (2 pi) max(0, cos alpha)^e, alpha the angle
 /// between the light and the mirror direction of the view, so that `specular` is the lobe's
 /// reflectance at normal incidence.
@@ -37,6 +45,7 @@ struct Material {
                                  ///< diffuse reflectance; metallic_roughness: base colour; mirror:
                                  ///< reflectance; glass: what passes a surface besides Fresnel
   int texture = -1;              ///< base colour: index into Scene::texture, or none
+  TextureMap map;                ///< of it
   // phong
   Rgb specular{0, 0, 0};  ///< linear, [0, 1]
   float exponent = 32;    ///< Phong e, >= 0
@@ -44,6 +53,7 @@ struct Material {
   float metallic = 0;                   ///< [0, 1]; times blue of its texture
   float roughness = 1;                  ///< perceptual, [0, 1]; times green of its texture
   int metallic_roughness_texture = -1;  ///< index into Scene::texture (linear values), or none
+  TextureMap metallic_roughness_map;    ///< of it
   float transmission = 0;  ///< [0, 1]: share of the diffuse part that passes straight through a
                            ///< thin wall instead (KHR_materials_transmission without volume)
   // measured
@@ -55,6 +65,7 @@ struct Material {
   bool thin = false;  ///< glass: a pane without inside: passes straight, both surfaces at once
   // all
   int normal_texture = -1;  ///< tangent-space normals as in glTF (linear values), or none
+  TextureMap normal_map;    ///< of it
   float normal_scale = 1;   ///< of their x and y
   float alpha_cutoff = 0;   ///< above 0: holes where the base texture's alpha is below it
 };
@@ -85,10 +96,11 @@ struct SceneReport {
 };
 
 struct Scene {
-  std::string name;                      ///< for messages and files: the imported file's name
-  std::vector<Vec3> position;            ///< world space, metres
-  std::vector<Vec3> normal;              ///< unit, one a vertex
-  std::vector<std::array<float, 2>> uv;  ///< one a vertex, v up; (0, 0) where there is none
+  std::string name;                       ///< for messages and files: the imported file's name
+  std::vector<Vec3> position;             ///< world space, metres
+  std::vector<Vec3> normal;               ///< unit, one a vertex
+  std::vector<std::array<float, 2>> uv;   ///< one a vertex, v up; (0, 0) where there is none
+  std::vector<std::array<float, 2>> uv2;  ///< second ones, likewise; empty: none anywhere
   std::vector<Rgb> tint;  ///< one a vertex, linear, multiplies the albedo; empty: all white
   std::vector<Triangle> triangle;
   std::vector<Material> material;         ///< at least one

@@ -206,7 +206,7 @@ void rebuild_vertices(Scene& scene, const std::vector<std::uint32_t>& place) {
   const Faces faces = faces_around(scene, place);
 
   Scene fresh;
-  KeyIndex<11> index;
+  KeyIndex<13> index;
   index.reserve(old_count);
   for (std::size_t t = 0; t < scene.triangle.size(); ++t) {
     for (std::uint32_t& v : scene.triangle[t].vertex) {
@@ -219,19 +219,23 @@ void rebuild_vertices(Scene& scene, const std::vector<std::uint32_t>& place) {
       }
       std::array<float, 2> uv{};
       if (old < scene.uv.size()) uv = scene.uv[old];
+      std::array<float, 2> uv2{};
+      if (old < scene.uv2.size()) uv2 = scene.uv2[old];
       Rgb tint{1, 1, 1};
       if (old < scene.tint.size()) tint = scene.tint[old];
       const Vec3& p = scene.position[old];
-      const Key<11> key{{p.x + 0.0, p.y + 0.0, p.z + 0.0, normal.x + 0.0, normal.y + 0.0,
+      const Key<13> key{{p.x + 0.0, p.y + 0.0, p.z + 0.0, normal.x + 0.0, normal.y + 0.0,
                          normal.z + 0.0, static_cast<double>(uv[0]) + 0.0,
                          static_cast<double>(uv[1]) + 0.0, static_cast<double>(tint.r) + 0.0,
-                         static_cast<double>(tint.g) + 0.0, static_cast<double>(tint.b) + 0.0}};
+                         static_cast<double>(tint.g) + 0.0, static_cast<double>(tint.b) + 0.0,
+                         static_cast<double>(uv2[0]) + 0.0, static_cast<double>(uv2[1]) + 0.0}};
       const auto [at, is_new] =
           index.try_emplace(key, static_cast<std::uint32_t>(fresh.position.size()));
       if (is_new) {
         fresh.position.push_back(p);
         fresh.normal.push_back(normal);
         fresh.uv.push_back(uv);
+        if (!scene.uv2.empty()) fresh.uv2.push_back(uv2);
         if (!scene.tint.empty()) fresh.tint.push_back(tint);
         if (bad[old]) ++scene.report.normals_made;
       }
@@ -241,6 +245,7 @@ void rebuild_vertices(Scene& scene, const std::vector<std::uint32_t>& place) {
   scene.position = std::move(fresh.position);
   scene.normal = std::move(fresh.normal);
   scene.uv = std::move(fresh.uv);
+  scene.uv2 = std::move(fresh.uv2);
   scene.tint = std::move(fresh.tint);
 }
 

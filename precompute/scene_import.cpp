@@ -130,6 +130,7 @@ void add_vertices(const aiMesh& mesh, const Transform& transform, FileType type,
     throw Error(ErrorKind::format,
                 fmt::format("{}: {} vertices, expected below 2^32", scene.name, before + count));
   }
+  if (mesh.HasTextureCoords(1) && scene.uv2.empty()) scene.uv2.resize(before);
   const bool tinted = mesh.HasVertexColors(0);
   if (tinted && scene.tint.empty()) scene.tint.assign(before, Rgb{1, 1, 1});
   for (unsigned v = 0; v < mesh.mNumVertices; ++v) {
@@ -146,6 +147,11 @@ void add_vertices(const aiMesh& mesh, const Transform& transform, FileType type,
       uv = {mesh.mTextureCoords[0][v].x, mesh.mTextureCoords[0][v].y};
     }
     scene.uv.push_back(uv);
+    if (mesh.HasTextureCoords(1)) {
+      scene.uv2.push_back({mesh.mTextureCoords[1][v].x, mesh.mTextureCoords[1][v].y});
+    } else if (!scene.uv2.empty()) {
+      scene.uv2.push_back({});
+    }
     if (tinted) {
       Rgb tint = unit_rgb(mesh.mColors[0][v]);
       if (type == FileType::ply) {

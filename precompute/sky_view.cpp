@@ -57,11 +57,11 @@ void weigh_lobe(const Packet* packet, std::uint64_t packets, const std::uint8_t*
 
 }  // namespace
 
-void SkyView::look(const Visibility& visibility, const SurfaceHit& y, const Bsdf& b,
-                   const Packet* packets, std::size_t count, RayCounts& counts) {
+void SkyView::look(const Visibility& visibility, const Vec3& from, const Bsdf& b,
+                   const Packet* packets, std::size_t count, std::int64_t& rays,
+                   Visibility::Surfaces see) {
   packets_ = packets;
   open_ = blocked_ = 0;
-  const Vec3 from = y.position + Visibility::kSurfaceOffset * y.geometric_normal;
   const std::array<float, 3> start{to_float(from.x), to_float(from.y), to_float(from.z)};
   const float normals[6] = {to_float(b.normal.x),           to_float(b.normal.y),
                             to_float(b.normal.z),           to_float(b.geometric_normal.x),
@@ -71,8 +71,8 @@ void SkyView::look(const Visibility& visibility, const SurfaceHit& y, const Bsdf
     const unsigned lanes = lanes_[p];
     if (lanes == 0) continue;
     const Packet& d = packets[p];
-    const unsigned blocked = visibility.occluded8(start, d.x, d.y, d.z, lanes);
-    counts.shadow += std::popcount(lanes);
+    const unsigned blocked = visibility.occluded8(start, d.x, d.y, d.z, lanes, see);
+    rays += std::popcount(lanes);
     open_lanes_[p] = static_cast<std::uint8_t>(lanes & ~blocked);
     blocked_lanes_[p] = static_cast<std::uint8_t>(blocked);
     open_ |= std::uint64_t{open_lanes_[p] != 0} << p;

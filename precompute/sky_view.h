@@ -9,9 +9,7 @@
 
 #include "precompute/bsdf.h"
 #include "precompute/lobe_lanes.h"
-#include "precompute/point_tracer.h"
 #include "precompute/sparse_directions.h"
-#include "precompute/surface.h"
 #include "precompute/visibility.h"
 
 namespace haarlight {
@@ -19,9 +17,11 @@ namespace haarlight {
 /// The directions of one packet list that a place sees; reused from place to place.
 class SkyView {
  public:
-  /// Traces rays from `y` through all directions of `packets` above both horizons.
-  void look(const Visibility& visibility, const SurfaceHit& y, const Bsdf& b,
-            const SparseDirections::Packet* packets, std::size_t count, RayCounts& counts);
+  /// Traces rays from `from`, local and off a surface of BSDF `b`, through all directions of
+  /// `packets` above both horizons; what they `see` blocks. Adds to `rays`.
+  void look(const Visibility& visibility, const Vec3& from, const Bsdf& b,
+            const SparseDirections::Packet* packets, std::size_t count, std::int64_t& rays,
+            Visibility::Surfaces see = Visibility::kAll);
 
   /// Bit p: packet p has directions that are open, or blocked.
   std::uint64_t open() const { return open_; }

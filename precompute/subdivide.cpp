@@ -235,8 +235,11 @@ void add_middle(Scene& scene, std::uint32_t a, std::uint32_t b) {
   scene.position.push_back(0.5 * (scene.position[a] + scene.position[b]));
   const Vec3 normal = scene.normal[a] + scene.normal[b];
   scene.normal.push_back(length(normal) > 1e-6 ? normalize(normal) : scene.normal[a]);
-  const auto &u = scene.uv[a], &v = scene.uv[b];
-  scene.uv.push_back({0.5f * (u[0] + v[0]), 0.5f * (u[1] + v[1])});
+  for (auto* uv : {&scene.uv, &scene.uv2}) {
+    if (uv->empty()) continue;
+    const auto u = (*uv)[a], v = (*uv)[b];
+    uv->push_back({0.5f * (u[0] + v[0]), 0.5f * (u[1] + v[1])});
+  }
   if (!scene.tint.empty()) scene.tint.push_back(0.5f * (scene.tint[a] + scene.tint[b]));
 }
 

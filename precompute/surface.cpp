@@ -2,6 +2,7 @@
 
 #include "precompute/surface.h"
 
+#include <array>
 #include <cmath>
 
 #include "precompute/texture.h"
@@ -22,26 +23,21 @@ const Image& texture_of(const Scene& scene, int index) {
 struct Spot {
   const Triangle& triangle;
   double b1, b2;
-  double u = 0, v = 0;
 
-  Spot(const Scene& scene, const Triangle& t, double second, double third)
-      : triangle(t), b1(second), b2(third) {
-    if (scene.texture.empty()) return;
-    const auto& a = scene.uv[t.vertex[0]];
-    const auto& b = scene.uv[t.vertex[1]];
-    const auto& c = scene.uv[t.vertex[2]];
-    const auto mix = [&](std::size_t i) {
-      return interpolate(static_cast<double>(a[i]), static_cast<double>(b[i]),
-                         static_cast<double>(c[i]), b1, b2);
-    };
-    u = mix(0), v = mix(1);
+  // On a texture.
+  std::array<double, 2> on(const Scene& scene, const TextureMap& map) const {
+    const auto a = texture_place(scene, triangle.vertex[0], map);
+    const auto b = texture_place(scene, triangle.vertex[1], map);
+    const auto c = texture_place(scene, triangle.vertex[2], map);
+    return {interpolate(a[0], b[0], c[0], b1, b2), interpolate(a[1], b[1], c[1], b1, b2)};
   }
 };
 
 Rgb albedo_at(const Scene& scene, const Material& material, const Spot& spot) {
   Rgb albedo = material.albedo;
   if (material.texture >= 0) {
-    albedo = albedo * sample_texture(texture_of(scene, material.texture), spot.u, spot.v);
+    const auto [u, v] = spot.on(scene, material.map);
+    albedo = albedo * sample_texture(texture_of(scene, material.texture), u, v);
   }
   if (!scene.tint.empty()) {
     const auto& vertex = spot.triangle.vertex;
@@ -57,11 +53,11 @@ Rgb albedo_at(const Scene& scene, const Material& material, const Spot& spot) {
 Vec3 bumped(const Scene& scene, const Material& material, const Spot& spot, const Vec3& smooth,
             const Vec3& ab, const Vec3& ac) {
   const auto& vertex = spot.triangle.vertex;
-  const auto uv = [&](std::size_t corner, std::size_t i) {
-    return static_cast<double>(scene.uv[vertex[corner]][i]);
-  };
-  const double u1 = uv(1, 0) - uv(0, 0), v1 = uv(1, 1) - uv(0, 1);
-  const double u2 = uv(2, 0) - uv(0, 0), v2 = uv(2, 1) - uv(0, 1);
+  const auto first = texture_place(scene, vertex[0], material.normal_map);
+  const auto second = texture_place(scene, vertex[1], material.normal_map);
+  const auto third = texture_place(scene, vertex[2], material.normal_map);
+  const double u1 = second[0] - first[0], v1 = second[1] - first[1];
+  const double u2 = third[0] - first[0], v2 = third[1] - first[1];
   const double area = u1 * v2 - u2 * v1;
   Vec3 along = area < 0 ? ab * -v2 + ac * v1 : ab * v2 - ac * v1;  // dp/du, but for its length
   along = along - dot(along, smooth) * smooth;
@@ -71,7 +67,8 @@ Vec3 bumped(const Scene& scene, const Material& material, const Spot& spot, cons
   // A texture that is mirrored on the surface turns the frame's hand round.
   const bool mirrored = (dot(cross(ab, ac), smooth) < 0) != (area < 0);
   const Vec3 bitangent = mirrored ? -cross(smooth, tangent) : cross(smooth, tangent);
-  const RgbD texel(sample_texture(texture_of(scene, material.normal_texture), spot.u, spot.v));
+  const auto [u, v] = spot.on(scene, material.normal_map);
+  const RgbD texel(sample_texture(texture_of(scene, material.normal_texture), u, v));
   const double scale = static_cast<double>(material.normal_scale);
   const Vec3 bump = tangent * ((2 * texel.r - 1) * scale) +
                     bitangent * ((2 * texel.g - 1) * scale) + smooth * (2 * texel.b - 1);
@@ -102,7 +99,7 @@ SurfaceHit surface_at(const Scene& scene, const Visibility& visibility, const Vi
                       const Vec3& direction) {
   const Triangle& t = scene.triangle[hit.triangle];
   const Material& material = scene.material[t.material];
-  const Spot spot(scene, t, hit.b1, hit.b2);
+  const Spot spot{t, hit.b1, hit.b2};
   const Vec3 a = visibility.corner(hit.triangle, 0), b = visibility.corner(hit.triangle, 1),
              c = visibility.corner(hit.triangle, 2);
   SurfaceHit surface;
@@ -132,8 +129,8 @@ SurfaceHit surface_at(const Scene& scene, const Visibility& visibility, const Vi
   surface.albedo = albedo_at(scene, material, spot);
   surface.metallic = material.metallic, surface.roughness = material.roughness;
   if (material.metallic_roughness_texture >= 0) {
-    const Rgb factor =
-        sample_texture(texture_of(scene, material.metallic_roughness_texture), spot.u, spot.v);
+    const auto [u, v] = spot.on(scene, material.metallic_roughness_map);
+    const Rgb factor = sample_texture(texture_of(scene, material.metallic_roughness_texture), u, v);
     surface.metallic *= factor.b, surface.roughness *= factor.g;
   }
   return surface;

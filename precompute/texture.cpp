@@ -48,4 +48,16 @@ float sample_texture(const std::vector<float>& values, int width, int height, do
   return Place(width, height, u, v).mix(values);
 }
 
+std::array<double, 2> texture_place(const Scene& scene, std::uint32_t vertex,
+                                    const TextureMap& map) {
+  const auto& all = map.second ? scene.uv2 : scene.uv;
+  const std::array<float, 2> uv = vertex < all.size() ? all[vertex] : std::array<float, 2>{};
+  const auto row = [&](std::size_t i) {
+    const float* m = map.matrix.data() + 3 * i;
+    return static_cast<double>(m[0]) * static_cast<double>(uv[0]) +
+           static_cast<double>(m[1]) * static_cast<double>(uv[1]) + static_cast<double>(m[2]);
+  };
+  return {row(0), row(1)};
+}
+
 }  // namespace haarlight

@@ -200,17 +200,16 @@ VertexMaterial VertexSampler::material_at(std::uint32_t vertex) const {
   VertexMaterial hit;
   hit.material = material_[vertex] == kNone ? 0 : material_[vertex];
   const Material& material = scene_.material[hit.material];
-  const double u = scene_.texture.empty() ? 0 : static_cast<double>(scene_.uv[vertex][0]);
-  const double v = scene_.texture.empty() ? 0 : static_cast<double>(scene_.uv[vertex][1]);
-  const auto texel = [&](int texture) {
+  const auto texel = [&](int texture, const TextureMap& map) {
+    const auto [u, v] = texture_place(scene_, vertex, map);
     return sample_texture(scene_.texture[static_cast<std::size_t>(texture)], u, v);
   };
   hit.albedo = material.albedo;
-  if (material.texture >= 0) hit.albedo = hit.albedo * texel(material.texture);
+  if (material.texture >= 0) hit.albedo = hit.albedo * texel(material.texture, material.map);
   if (!scene_.tint.empty()) hit.albedo = hit.albedo * scene_.tint[vertex];
   hit.metallic = material.metallic, hit.roughness = material.roughness;
   if (material.metallic_roughness_texture >= 0) {
-    const Rgb factor = texel(material.metallic_roughness_texture);
+    const Rgb factor = texel(material.metallic_roughness_texture, material.metallic_roughness_map);
     hit.metallic *= factor.b, hit.roughness *= factor.g;
   }
   return hit;

@@ -27,12 +27,28 @@ namespace haarlight {
 namespace {
 
 // Triangles by what rays do with them; each kind is one geometry of Embree.
-enum Kind : std::size_t { opaque, opaque_holed, specular, specular_holed, kinds };
+enum Kind : std::size_t {
+  opaque,
+  opaque_holed,
+  glossy,
+  glossy_holed,
+  specular,
+  specular_holed,
+  kinds
+};
+
+bool is_holed(std::size_t kind) { return kind % 2 != 0; }
 
 Kind kind_of(const Material& material) {
   const bool holed = material.alpha_cutoff > 0;
   if (has_single_directions(material)) return holed ? specular_holed : specular;
+  if (may_have_narrow_lobe(material)) return holed ? glossy_holed : glossy;
   return holed ? opaque_holed : opaque;
+}
+
+unsigned mask_of(std::size_t kind) {
+  if (kind >= specular) return Visibility::kSpecular;
+  return kind >= glossy ? Visibility::kOpaque | Visibility::kGlossy : Visibility::kOpaque;
 }
 
 }  // namespace
@@ -155,9 +171,9 @@ Visibility::Visibility(const Scene& scene) : device_(std::make_unique<Device>())
   const Vec3 half = high - center_;
   const double largest = std::max({half.x, half.y, half.z});
   if (!(largest > 0) || !std::isfinite(largest)) {
-    throw Error(ErrorKind::format,
-                fmt::format("{}: bounding box half width is {}, expected a finite value above 0",
-                            scene.name, largest));
+    throw Error(ErrorKind::format, fmt::format("{}: bounding box half width is {}, expected a "
+                                               "finite value above 0",
+                                               scene.name, largest));
   }
   int exponent = 0;
   std::frexp(largest, &exponent);  // largest in [2^(e-1), 2^e)
@@ -174,8 +190,9 @@ Visibility::Visibility(const Scene& scene) : device_(std::make_unique<Device>())
   std::array<std::size_t, kinds> count{};
   for (const Triangle& t : scene.triangle) ++count[kind_of(scene.material[t.material])];
   has_specular_ = count[specular] + count[specular_holed] > 0;
-  has_holes_ = count[opaque_holed] + count[specular_holed] > 0;
-  if ((has_specular_ &&
+  has_glossy_ = count[glossy] + count[glossy_holed] > 0;
+  has_holes_ = count[opaque_holed] + count[glossy_holed] + count[specular_holed] > 0;
+  if (((has_specular_ || has_glossy_) &&
        rtcGetDeviceProperty(device_->device, RTC_DEVICE_PROPERTY_RAY_MASK_SUPPORTED) == 0) ||
       (has_holes_ &&
        rtcGetDeviceProperty(device_->device, RTC_DEVICE_PROPERTY_FILTER_FUNCTION_SUPPORTED) == 0)) {
@@ -212,7 +229,7 @@ Visibility::Visibility(const Scene& scene) : device_(std::make_unique<Device>())
     const Kind kind = kind_of(scene.material[triangle.material]);
     const std::size_t place = next[kind]++;
     for (std::size_t c = 0; c < 3; ++c) index[3 * place + c] = triangle.vertex[c];
-    if (kind == opaque_holed || kind == specular_holed) device_->holes[kind].add(scene, triangle);
+    if (is_holed(kind)) device_->holes[kind].add(scene, triangle);
     if (!mixed) continue;
     device_->triangle_at[place] = static_cast<std::uint32_t>(t);
     device_->place_of[t] = static_cast<std::uint32_t>(place);
@@ -227,8 +244,8 @@ Visibility::Visibility(const Scene& scene) : device_(std::make_unique<Device>())
     rtcSetGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, indices.buffer,
                          3 * sizeof(std::uint32_t) * device_->first[k], 3 * sizeof(std::uint32_t),
                          count[k]);
-    rtcSetGeometryMask(geometry, k == specular || k == specular_holed ? kSpecular : kOpaque);
-    if (k == opaque_holed || k == specular_holed) {
+    rtcSetGeometryMask(geometry, mask_of(k));
+    if (is_holed(k)) {
       rtcSetGeometryUserData(geometry, &device_->holes[k]);
       rtcSetGeometryIntersectFilterFunction(geometry, pass_holes);
       rtcSetGeometryOccludedFilterFunction(geometry, pass_holes);

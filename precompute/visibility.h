@@ -27,6 +27,7 @@ class Visibility {
   enum Surfaces : unsigned {
     kOpaque = 1,    ///< those that has_single_directions() denies
     kSpecular = 2,  ///< those that may have some: mirrors, glass, thin transmission
+    kGlossy = 4,    ///< of the opaque ones those that may_have_narrow_lobe() names
     kAll = 3
   };
 
@@ -71,8 +72,9 @@ class Visibility {
                               const float* z, unsigned lanes, Surfaces seen = kAll) const;
 
   std::size_t triangle_count() const { return triangle_count_; }
-  /// Whether any triangle is seen by kSpecular rays; has an alpha cutoff.
+  /// Whether any triangle is seen by kSpecular rays; by kGlossy rays; has an alpha cutoff.
   bool has_specular() const { return has_specular_; }
+  bool has_glossy() const { return has_glossy_; }
   bool has_holes() const { return has_holes_; }
   /// Corner 0, 1 or 2 of a triangle as Embree holds it, local.
   Vec3 corner(std::uint32_t triangle, int corner) const;
@@ -85,7 +87,7 @@ class Visibility {
   Vec3 center_;
   double scale_ = 1;
   std::size_t triangle_count_ = 0;
-  bool has_specular_ = false, has_holes_ = false;
+  bool has_specular_ = false, has_glossy_ = false, has_holes_ = false;
 };
 
 }  // namespace haarlight

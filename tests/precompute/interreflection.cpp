@@ -139,6 +139,42 @@ TEST(Interreflection, ColorBleeds) {
   EXPECT_NEAR(green_gain, 0, 1e-3 * red_gain);
 }
 
+// A floor beside a high, smooth wall of white metal: what the wall hides of an even sky it shows
+// instead, so that the floor reflects all of it, up to what the lobe sends below the horizon and
+// past the wall's borders (1 % each). Half of the light comes by way of a lobe of 0.005 radians,
+// and hardly any of it by chance: it must be looked for, and must not count twice.
+TEST(Interreflection, NarrowLobesAreLookedFor) {
+  Scene scene = shapes::empty_scene();
+  shapes::add_quad(scene, {-2, 0, -6}, {0, 0, 12}, {8, 0, 0});
+  shapes::add_quad(scene, {-2, 0, -50}, {0, 50, 0}, {0, 0, 100}, 1);
+  scene.material[0].albedo = {0.8f, 0.8f, 0.8f};
+  Material metal;
+  metal.model = SurfaceModel::metallic_roughness;
+  metal.albedo = {1, 1, 1};
+  metal.metallic = 1;
+  metal.roughness = 0.05f;
+  scene.material.push_back(metal);
+  double sum = 0, square = 0;
+  constexpr int kSeeds = 4;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    TraceOptions options = options_with(1, 512);
+    options.seed = static_cast<std::uint64_t>(seed);
+    const Traced t = trace(scene, options, {0, 4, 0.001});
+    double mean = 0;
+    for (std::size_t row = 0; row < kTileRows; ++row) {
+      mean += under_even_sky(t.rows, row, 1, 16) / kTileRows;
+    }
+    sum += mean, square += mean * mean;
+    // Under lamps of a texel each: without looking, 32 paths a row would bring noise of more than
+    // 1.
+    EXPECT_LT(t.noise.worst(), 0.3);
+  }
+  const double mean = sum / kSeeds;
+  const double error = std::sqrt(std::max(0.0, square / kSeeds - mean * mean) / (kSeeds - 1));
+  EXPECT_LT(error, 0.01);
+  EXPECT_NEAR(mean, 0.8, 4 * error + 0.02);
+}
+
 TEST(Interreflection, BlackSceneTracesNoPath) {
   const Traced t = trace(open_box(0.0f), options_with(8, 1024));
   EXPECT_EQ(t.counts.paths, 0);
