@@ -64,8 +64,12 @@ TEST(SizeLimit, PruningDropsTheSmallBlocksAndNothingElse) {
           }
         }
       }
-      if (threshold == 0.02f) EXPECT_GT(kept, 20u);
-      if (threshold == 1.0f) EXPECT_EQ(kept, 0u);
+      if (threshold == 0.02f) {
+        EXPECT_GT(kept, 20u);
+      }
+      if (threshold == 1.0f) {
+        EXPECT_EQ(kept, 0u);
+      }
     }
   }
 }
