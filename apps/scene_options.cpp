@@ -174,6 +174,13 @@ StagedScene load_scene(SceneOptions& options, bool say_repairs) {
                             options.scene.string()));
   }
   for (const std::string& pair : options.merl) set_merl(pair, options.scene, staged.scene);
+  for (const Material& material : staged.scene.material) {
+    if (material.model != SurfaceModel::measured || options.vertices) continue;
+    throw Error(ErrorKind::invalid_argument,
+                fmt::format("{}: material \"{}\" is a measured BRDF, expected --vertices: a fixed "
+                            "view has none",
+                            options.scene.string(), material.name));
+  }
   options.stage.use_scene_camera = options.view != SceneOptions::View::framing;
   staged.stage = set_stage(staged.scene, options.stage);
   return staged;

@@ -136,8 +136,15 @@ RelightStats ClusterRelighter::apply(const LightingUpdate& update) {
   State& s = *state_;
   RelightStats stats;
 
-  // Where each pixel looks, first: it says which clusters matter.
+  // Step 1: vectors follow the light, whatever comes of looking: the tracker has moved on.
   const Clock::time_point begin = Clock::now();
+  const auto mark = [&s](int chunk, const double*) {
+    s.changed_chunks[static_cast<std::size_t>(chunk)] = 1;
+  };
+  stats.apply = s.vectors.apply(update, std::ref(mark));
+  const Clock::time_point applied = Clock::now();
+
+  // Where each pixel looks says which clusters matter.
   if (!s.looked) {
     s.drawing.look(s.camera);
     if (s.finish) s.finish->look(s.camera.position);
@@ -146,32 +153,31 @@ RelightStats ClusterRelighter::apply(const LightingUpdate& update) {
   }
   const Clock::time_point looked = Clock::now();
 
-  // Step 1: vectors follow the light.
-  std::fill(s.changed_chunks.begin(), s.changed_chunks.end(), std::uint8_t{0});
-  const auto mark = [&s](int chunk, const double*) {
-    s.changed_chunks[static_cast<std::size_t>(chunk)] = 1;
-  };
-  stats.apply = s.vectors.apply(update, std::ref(mark));
-  const Clock::time_point applied = Clock::now();
-
   // Step 2: vertices follow the vectors.
   s.combined = s.vertices.follow(s.vectors, s.changed_chunks,
                                  s.options.skip_unseen ? std::span<const std::uint8_t>(s.seen)
                                                        : std::span<const std::uint8_t>(),
                                  s.exact ? 0 : s.terms_a_frame, s.sums);
+  std::fill(s.changed_chunks.begin(), s.changed_chunks.end(), std::uint8_t{0});
   stats.apply.transport_bytes += s.combined.weight_bytes;
   stats.apply.sum_bytes += s.combined.sum_bytes;
   const Clock::time_point combined = Clock::now();
-  s.combine_ms = milliseconds(applied, combined);
+  s.combine_ms = milliseconds(looked, combined);
 
   // Step 3: view factors, picture.
   s.draw(s.combined.changes > 0);
-  stats.apply_ms = milliseconds(looked, combined);
-  stats.finish_ms = milliseconds(begin, looked) + milliseconds(combined, Clock::now());
+  stats.apply_ms = milliseconds(begin, applied) + milliseconds(looked, combined);
+  stats.finish_ms = milliseconds(applied, looked) + milliseconds(combined, Clock::now());
   return stats;
 }
 
 void ClusterRelighter::expect_resets(bool expected) { state_->vectors.expect_resets(expected); }
+double ClusterRelighter::reset_bytes(int band) const {
+  return static_cast<double>(state_->vectors.reset_bytes(band));
+}
+double ClusterRelighter::fold_bytes() const {
+  return static_cast<double>(state_->vectors.fold_bytes());
+}
 void ClusterRelighter::set_exact(bool exact) { state_->exact = exact; }
 bool ClusterRelighter::settled() const { return state_->vertices.settled(); }
 const Camera& ClusterRelighter::camera() const { return state_->camera; }

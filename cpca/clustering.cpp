@@ -367,7 +367,8 @@ Clustering Clusterer::run() {
   left_.assign(lit_.size(), 0.0);
 
   // Where flats begin: k-means.
-  seed(std::max<std::size_t>(1, wanted - wanted / 4));
+  // Splits, which make the last quarter, come with iterations.
+  seed(options_.iterations > 0 ? std::max<std::size_t>(1, wanted - wanted / 4) : wanted);
   report(0.15);
   for (int round = 0; round < kMeansRounds; ++round) {
     gather();

@@ -2,6 +2,7 @@
 
 #include "cpca/sketch.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -117,13 +118,15 @@ Sketch sketch_rows(const VertexRows& rows, int dims, std::uint64_t seed, const P
   out.dims = dims;
   out.value.assign(rows.vertices() * static_cast<std::size_t>(dims), 0.0f);
   ChunkSketch sketch(rows, seed, out);
-  // A vertex's terms may lie in two chunks that follow each other: even ones first, then odd ones,
-  // so that no sum has two owners and each has one order.
+  // A vertex's terms may lie in chunks that follow each other, as many as 16 vertices fill: chunks
+  // are taken that far apart, so that no sum has two owners and each has one order.
   const int chunks = rows.transport().chunk_count();
   int done = 0;
-  for (int parity = 0; parity < 2; ++parity) {
-    parallel_for((chunks + 1 - parity) / 2, [&](int i) {
-      sketch.add(2 * i + parity);
+  const int run = kBlockRows * rows.terms();
+  const int stride = 1 + (run + kChunkRows - 1) / kChunkRows;
+  for (int phase = 0; phase < std::min(stride, chunks); ++phase) {
+    parallel_for((chunks - phase + stride - 1) / stride, [&](int i) {
+      sketch.add(stride * i + phase);
       bool go_on = true;
 #pragma omp critical(haarlight_sketch_progress)
       {

@@ -223,6 +223,7 @@ bool may_have_narrow_lobe(const Material& material) {
       return l1_norm(RgbD(material.specular)) > 0 && material.exponent > 80;
     case SurfaceModel::metallic_roughness:
       return material.roughness < 0.5f || material.metallic_roughness_texture >= 0;
+    case SurfaceModel::measured:
     case SurfaceModel::mirror:
     case SurfaceModel::glass:
       break;

@@ -236,7 +236,7 @@ class Interreflection::Paths {
     if (shares_lobe(b) && s_.connections.sees(l)) {
       const std::int32_t path = new_shared_path();
       s_.connections.add_lobe(l, s_.sums.weights(path));
-      walk(path, *hit, b, kLobe, {1, 1, 1}, 1, false, false, random);
+      walk(path, *hit, b, kLobe, {1, 1, 1}, 1, false, follows_lobes(), random);
       rest = kDelta;
     }
     if ((b.has_lobe() && (rest & kLobe) != 0) || b.delta_count > 0) {
@@ -288,11 +288,11 @@ class Interreflection::Paths {
       const RgbD out = in_base ? RgbD{1, 1, 1} : b.diffuse_out(b.to_viewer);
       const bool diffuse = (parts & kDiffuse) != 0 && b.has_diffuse();
       const bool lobe = (parts & kLobe) != 0 && b.has_lobe();
+      const bool more = bounce < o_.effects_.bounces;
       if (diffuse || (lobe && !narrow))
-        gather(path, y, b, diffuse, lobe && !narrow, out, tint, random);
+        gather(path, y, b, diffuse, lobe && !narrow, out, tint, more && follows_lobes(), random);
 
       // One way on.
-      const bool more = bounce < o_.effects_.bounces;
       const double by_diffuse =
           diffuse && more ? luminance(tint * (in_base ? b.diffuse_reflectance : b.diffuse_albedo()))
                           : 0;
@@ -372,9 +372,10 @@ class Interreflection::Paths {
     s_.sums.add_deposit(path, texel_of(direction, o_.sky_.layout().face_size()), tint);
   }
 
-  // What y sees of a phase of the sky, as one column a part.
+  // What y sees of a phase of the sky, as one column a part. `lobes`: by way of narrow lobes, too,
+  // which are a bounce.
   void gather(std::int32_t path, const SurfaceHit& y, const Bsdf& b, bool diffuse, bool lobe,
-              const RgbD& out, const RgbD& tint, PathRandom& random) {
+              const RgbD& out, const RgbD& tint, bool lobes, PathRandom& random) {
     const SparseDirections& directions = o_.sky_.directions();
     const int phase = phase_ >= 0
                           ? phase_
@@ -398,21 +399,21 @@ class Interreflection::Paths {
       s_.sums.close_column(column);
       if (both) s_.sums.close_column(column + 1);
     }
-    if (s_.view.blocked() != 0 && (follows_lobes() || follows_specular())) {
+    if (s_.view.blocked() != 0 && (lobes || follows_specular())) {
       const std::uint64_t key =
           mix_bits(o_.seed_ + 3, path_key_ * 64 + static_cast<std::uint64_t>(place));
       const RgbD diffuse_out = diffuse ? tint * out : RgbD{};
-      follow_blocked(path, from, b, diffuse_out, lobe ? tint : RgbD{}, packets, key);
+      follow_blocked(path, from, b, diffuse_out, lobe ? tint : RgbD{}, lobes, packets, key);
     }
   }
 
   // Some of the directions that mirrors, glass or narrow lobes block, by way of them. `diffuse` and
   // `lobe` are what the parts of the BSDF are multiplied with.
   void follow_blocked(std::int32_t path, const Vec3& from, const Bsdf& b, const RgbD& diffuse,
-                      const RgbD& lobe, const SparseDirections::Packet* packets,
+                      const RgbD& lobe, bool lobes, const SparseDirections::Packet* packets,
                       std::uint64_t key) {
-    const unsigned surfaces = (follows_lobes() ? Visibility::kGlossy : 0u) |
-                              (follows_specular() ? Visibility::kSpecular : 0u);
+    const unsigned surfaces =
+        (lobes ? Visibility::kGlossy : 0u) | (follows_specular() ? Visibility::kSpecular : 0u);
     const std::array<float, 3> start{static_cast<float>(from.x), static_cast<float>(from.y),
                                      static_cast<float>(from.z)};
     for (std::uint64_t left = s_.view.blocked(); left != 0; left &= left - 1) {
@@ -431,7 +432,7 @@ class Interreflection::Paths {
         const auto hit = surface_hit(o_.scene_, o_.visibility_, from, w);
         if (!hit) continue;
         Glint sent;
-        if (!follow(*hit, chance, sent)) continue;
+        if (!follow(*hit, lobes, chance, sent)) continue;
         RgbD through = diffuse * b.diffuse_in(w);
         if (l1_norm(lobe) > 0) through += lobe * lobe_color(b, w);
         deposit(path, sent.direction,
@@ -441,7 +442,7 @@ class Interreflection::Paths {
   }
 
   // What comes from the open by way of `hit`: through mirrors and glass, or by a narrow lobe.
-  bool follow(const SurfaceHit& hit, PathRandom& random, Glint& sent) {
+  bool follow(const SurfaceHit& hit, bool lobes, PathRandom& random, Glint& sent) {
     const Bsdf met = bsdf_at(o_.scene_, hit);
     if (met.delta_count > 0) {
       if (!follows_specular()) return false;
@@ -450,7 +451,7 @@ class Interreflection::Paths {
       sent = {end.direction, end.weight};
       return !end.hit && luminance(end.weight) > 0;
     }
-    if (!follows_lobes() || !is_followed(hit, met)) return false;
+    if (!lobes || !is_followed(hit, met)) return false;
     const auto found = glint(hit, met, random);
     if (found) sent = *found;
     return found.has_value();

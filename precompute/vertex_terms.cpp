@@ -27,12 +27,13 @@ struct Mean {
   RgbD albedo;
   double metallic = 0, roughness = 0;
   double count = 0;
-  bool varies = false;  // the albedo
+  bool varies = false;  // the albedo, or the metalness: diffuse part and lobe then differ
   Rgb first;
+  float first_metallic = 0;
 
   void add(const VertexMaterial& v) {
-    if (count == 0) first = v.albedo;
-    varies = varies || !(v.albedo == first);
+    if (count == 0) first = v.albedo, first_metallic = v.metallic;
+    varies = varies || !(v.albedo == first) || v.metallic != first_metallic;
     albedo += RgbD(v.albedo);
     metallic += static_cast<double>(v.metallic), roughness += static_cast<double>(v.roughness);
     count += 1;

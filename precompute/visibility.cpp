@@ -190,10 +190,12 @@ Visibility::Visibility(const Scene& scene) : device_(std::make_unique<Device>())
   std::array<std::size_t, kinds> count{};
   for (const Triangle& t : scene.triangle) ++count[kind_of(scene.material[t.material])];
   has_specular_ = count[specular] + count[specular_holed] > 0;
-  has_glossy_ = count[glossy] + count[glossy_holed] > 0;
+  // Lobes are looked for to have less noise: without masks they are found by chance.
+  const bool masks =
+      rtcGetDeviceProperty(device_->device, RTC_DEVICE_PROPERTY_RAY_MASK_SUPPORTED) != 0;
+  has_glossy_ = masks && count[glossy] + count[glossy_holed] > 0;
   has_holes_ = count[opaque_holed] + count[glossy_holed] + count[specular_holed] > 0;
-  if (((has_specular_ || has_glossy_) &&
-       rtcGetDeviceProperty(device_->device, RTC_DEVICE_PROPERTY_RAY_MASK_SUPPORTED) == 0) ||
+  if ((has_specular_ && !masks) ||
       (has_holes_ &&
        rtcGetDeviceProperty(device_->device, RTC_DEVICE_PROPERTY_FILTER_FUNCTION_SUPPORTED) == 0)) {
     throw Error(ErrorKind::io, fmt::format("{}: Embree was built without ray masks or filter "

@@ -150,6 +150,7 @@ JournalHead unpack_head(std::span<const std::byte> bytes, const std::string& nam
     info.width = j.at("width").get<int>();
     info.height = j.at("height").get<int>();
     info.terms = j.at("terms").get<int>();
+    if (info.terms < 1 || info.terms > kMaxTerms) throw refuse("its head cannot be read");
     info.camera = camera_of(j.at("camera"));
     const std::span<const std::byte> rest = body.subspan(fixed.text);
     const auto part = [&](const char* wanted) -> std::optional<std::span<const std::byte>> {

@@ -65,11 +65,12 @@ TermFinish::TermFinish(std::shared_ptr<const TransportMesh> mesh,
     for (std::size_t k = 0; k < terms; ++k) {
       const std::span<const Rgb> profile = view_->profile_of(s, k);
       for (const Rgb& p : profile) profile_.push_back({{p.r, p.g, p.b, 0}});
+      // Dark terms before the last that is not are looked at, too: their orders count.
+      set.most_order = std::max(set.most_order, std::abs(view_->order[s * terms + k]));
       if (std::all_of(profile.begin(), profile.end(), [](const Rgb& p) { return p == Rgb{}; })) {
         continue;
       }
       set.terms = static_cast<std::uint32_t>(k + 1);
-      set.most_order = std::max(set.most_order, std::abs(view_->order[s * terms + k]));
     }
   }
   for (const auto& n : mesh_->normal) {

@@ -68,8 +68,13 @@ void TimeBudget::start(double milliseconds, Clock::time_point now,
 
 void TimeBudget::begin(std::span<const Rgb>, std::span<const Rgb>, const BandMask& reset) {
   begun_ms_ = std::chrono::duration<double, std::milli>(now_() - started_).count();
-  moved_ = fixed_bytes_;
+  // Where nothing of the old light stays, sums start from zero and nothing is streamed back.
+  bool from_zero = true;
   for (std::size_t b = 0; b < reset_bytes_.size(); ++b) {
+    from_zero = from_zero && (reset[b] || reset_bytes_[b] == 0);
+  }
+  moved_ = fixed_bytes_;
+  for (std::size_t b = 0; !from_zero && b < reset_bytes_.size(); ++b) {
     if (reset[b]) moved_ += reset_bytes_[b];
   }
   allowed_ = model_.bytes_within(aim() * wanted_ - begun_ms_);

@@ -293,6 +293,15 @@ Transport Transport::open(const std::filesystem::path& file) {
   RowTables tables = unpack_tables(
       section_bytes(input, header.rows, name, "row tables", ZSTD_compressBound(20 * rows)), rows,
       data->info.output_count(), name);
+  if (data->info.kind == TransportKind::clusters) {
+    // Clusters find their rows by number, and have their colours at vertices.
+    for (std::size_t i = 0; i < data->info.output_count(); ++i) {
+      const Rgb& c = tables.row_color[i];
+      if (tables.row_output[i] != i || c.r != c.g || c.r != c.b) {
+        damaged(name, fmt::format("row {} of clusters is out of order or coloured", i));
+      }
+    }
+  }
   data->row_output = std::move(tables.row_output);
   data->row_color = std::move(tables.row_color);
   data->coverage = std::move(tables.coverage);

@@ -13,7 +13,7 @@ build=(g++ cmake ninja-build pkg-config libopenimageio-dev openimageio-tools lib
   libspdlog-dev libfmt-dev libzstd-dev libxxhash-dev libopenmpi-dev openmpi-bin libglfw3-dev libepoxy-dev libimgui-dev
   libstb-dev fonts-dejavu-core)
 demo=(python3 python3-numpy python3-matplotlib)
-test=(python3 python3-numpy python3-matplotlib libgtest-dev librapidcheck-dev libbenchmark-dev
+test=(patch python3 python3-numpy python3-matplotlib libgtest-dev librapidcheck-dev libbenchmark-dev
   xvfb xauth libgl1-mesa-dri libgl1)
 
 check=(clang libclang-rt-14-dev libomp-dev valgrind assimp-testmodels)

@@ -106,6 +106,22 @@ TEST(HardCases, Row22_PhongOfExponentTenThousand) {
   at_most("error of the integral", sum_error, 1e-4);
 }
 
+// What the lobe reflects of an even sky, summed over texels.
+double reflected(const DirectionTable& table, const GlossyLobe& lobe, const Bsdf& b) {
+  std::vector<float> first_weights(static_cast<std::size_t>(table.samples)),
+      second_weights(first_weights);
+  double sum = 0;
+  for (std::size_t begin = 0; begin < table.texels(); begin += 32) {
+    float first[32] = {}, second[32] = {};
+    lobe.whole(begin, 32, 0xffffffffu, first, second, first_weights, second_weights);
+    for (std::size_t i = 0; i < 32; ++i) {
+      sum += b.gloss_first.r * static_cast<double>(first[i]) +
+             b.gloss_second.r * static_cast<double>(second[i]);
+    }
+  }
+  return sum;
+}
+
 TEST(HardCases, Row23_LobeBelowATexel) {
   property("white furnace: a lobe narrower than a texel reflects 1 +- 0.01 however it lies");
   std::mt19937_64 random(2);
@@ -113,7 +129,6 @@ TEST(HardCases, Row23_LobeBelowATexel) {
   double phong_error = 0, ggx_error = 0;
   for (const int n : {16, 64, 128}) {
     const DirectionTable table(n, 4);
-    std::vector<float> first(4), second(4);
     for (int trial = 0; trial < 60; ++trial) {
       Vec3 axis = normalize(Vec3{gauss(random), gauss(random), gauss(random)});
       if (trial < 27 && trial != 13) {  // along faces, edges and corners too
@@ -123,11 +138,7 @@ TEST(HardCases, Row23_LobeBelowATexel) {
         const Bsdf b = bsdf_of(phong(exponent), axis, axis);
         const GlossyLobe lobe(table, b);
         double sum = 0;
-        for (std::size_t k = 0; k < table.texels(); ++k) {
-          if (!lobe.reaches(k)) continue;
-          const Bsdf::LobeValues whole = lobe.whole(k, first, second);
-          sum += b.gloss_first.r * whole.first + b.gloss_second.r * whole.second;
-        }
+        sum = reflected(table, lobe, b);
         phong_error = std::max(phong_error, std::abs(sum - 1));
       }
       // GGX lobes narrower than the samples are drawn from: the mean of f / pdf over the draws.
@@ -145,10 +156,7 @@ TEST(HardCases, Row23_LobeBelowATexel) {
             sum += (b.gloss_first.r * f.first + b.gloss_second.r * f.second) / draw->pdf / 256;
           }
         } else {
-          for (std::size_t k = 0; k < table.texels(); ++k) {
-            const Bsdf::LobeValues whole = lobe.whole(k, first, second);
-            sum += b.gloss_first.r * whole.first + b.gloss_second.r * whole.second;
-          }
+          sum = reflected(table, lobe, b);
         }
         ggx_error = std::max(ggx_error, std::abs(sum - 1));
       }
