@@ -66,7 +66,8 @@ int main(int argc, char** argv) {
   };
   add("plan", "Says which effects a scene calls for, why, and what each costs",
       haarlight::add_plan);
-  add("precompute", "Traces a scene's transport, for one view or a mesh's vertices, and writes it to a file",
+  add("precompute",
+      "Traces a scene's transport, for one view or a mesh's vertices, and writes it to a file",
       haarlight::add_precompute);
   add("compress", "Makes a mesh's transport smaller and faster: clustered PCA",
       haarlight::add_compress);

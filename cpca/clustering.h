@@ -12,7 +12,8 @@
 namespace haarlight {
 
 struct ClusteringOptions {
-  int clusters = 400;      ///< >= 1; fewer come out if there are fewer different points
+  int clusters = 400;      ///< >= 1; fewer come out if there are fewer different points, or
+                           ///< if nothing is left to split off: all errors are 0
   int basis = 8;           ///< dimensions of a cluster's flat while points are shared out
   int iterations = 12;     ///< most rounds of assignment and PCA
   std::uint64_t seed = 1;  ///< of the first centres

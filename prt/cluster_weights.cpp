@@ -147,9 +147,9 @@ ClusterWeights unpack_cluster_weights(std::span<const std::byte> packed, std::si
   }
   const std::size_t weight_bytes = weights * (counts[3] / 8);
   const std::size_t starts = 4 * (vertices + 2 * (clusters + 1) + vectors);
-  const std::vector<std::byte> plain =
-      decompress_bytes(packed.subspan(kCountsBytes), starts + weight_bytes + 6 * tints,
-                       4 * (2 * (clusters + 1) + vectors) + weight_bytes + 6 * tints, name, "clusters");
+  const std::vector<std::byte> plain = decompress_bytes(
+      packed.subspan(kCountsBytes), starts + weight_bytes + 6 * tints,
+      4 * (2 * (clusters + 1) + vectors) + weight_bytes + 6 * tints, name, "clusters");
   ClusterWeights w;
   w.bits = static_cast<int>(counts[3]);
   const std::byte* at = take(plain.data(), w.vertex, vertices);

@@ -25,7 +25,8 @@ haarlight_hard_test(determinism SOURCES determinism USES haarlight_precompute ha
 haarlight_hard_test(clusters SOURCES clusters USES haarlight_cpca)
 haarlight_hard_test(factors SOURCES factors USES haarlight_precompute)
 
-haarlight_hard_test(files SOURCES files_damage files_models USES haarlight_fuzz_targets XxHash::XxHash)
+haarlight_hard_test(files SOURCES files_damage USES haarlight_fuzz_targets XxHash::XxHash)
+haarlight_hard_test(models SOURCES files_models USES haarlight_fuzz_targets XxHash::XxHash)
 
 # A library preloaded into the programs under test, which makes their writes fail; and a program that
 # writes what haarlight writes beside transports and pictures.

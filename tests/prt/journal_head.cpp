@@ -19,7 +19,7 @@ JournalHead picture_head() {
   head.info.width = 641, head.info.height = 359;
   head.info.camera = look_at({1.25, 2.5, 1.0 / 3}, {0, 0.1, 0}, 0.7, 641, 359);
   head.fingerprint = "0123456789abcdef";
-  head.thresholds = {0.0f, 1e-5f, 1.0f / 3};
+  head.thresholds = {0.0f, 1e-5f, 1.0f / 3, 1e-4f, 0.125f};
   head.meta = "{\"options\":{\"face\":32}}";
   head.max_bytes = std::uint64_t{1} << 40 | 12345;
   head.shard = {2, 5};
@@ -31,6 +31,7 @@ JournalHead mesh_head() {
   JournalHead head = picture_head();
   const auto small = fixtures::small_mesh_transport(8, fixtures::bumpy_sphere(60, 3), 4);
   head.info = small.info;
+  head.thresholds = {0.0f, 1e-5f, 1.0f / 3};
   return head;
 }
 
