@@ -16,18 +16,24 @@ namespace {
 
 Vec3 reflect(const Vec3& n, const Vec3& o) { return 2 * dot(n, o) * n - o; }
 
+Vec3 at_length(const Bsdf&, const Vec3& direction) { return normalize(direction); }
+Vec3 at_length(const SingleDirections&, const Vec3& direction) { return direction; }
+
 // By the smooth normal, or the true one where the smooth one would reflect into the surface.
-Vec3 reflected(const Bsdf& b) {
+template <typename Point>
+Vec3 reflected(const Point& b) {
   const Vec3 smooth = reflect(b.normal, b.to_viewer);
-  if (dot(smooth, b.geometric_normal) > 0) return normalize(smooth);
-  return normalize(reflect(b.geometric_normal, b.to_viewer));
+  if (dot(smooth, b.geometric_normal) > 0) return at_length(b, smooth);
+  return at_length(b, reflect(b.geometric_normal, b.to_viewer));
 }
 
+// Of length 1 but for rounding.
 Vec3 refract(const Vec3& n, const Vec3& o, double eta, double cosine_beyond) {
-  return normalize((eta * dot(n, o) - cosine_beyond) * n - eta * o);
+  return (eta * dot(n, o) - cosine_beyond) * n - eta * o;
 }
 
-void add_delta(Bsdf& b, const Bsdf::Delta& delta) {
+template <typename Point>
+void add_delta(Point& b, const Bsdf::Delta& delta) {
   if (l1_norm(delta.weight) > 0) b.delta[static_cast<std::size_t>(b.delta_count++)] = delta;
 }
 
@@ -80,7 +86,8 @@ void add_metallic_roughness(Bsdf& b, const Material& material, const SurfaceHit&
   }
 }
 
-void add_glass(Bsdf& b, const Material& material, bool outside, const RgbD& tint) {
+template <typename Point>
+void add_glass(Point& b, const Material& material, bool outside, const RgbD& tint) {
   const double ior = std::max(static_cast<double>(material.ior), 1.0);
   const double cosine = dot(b.normal, b.to_viewer);
   if (material.thin) {
@@ -101,7 +108,7 @@ void add_glass(Bsdf& b, const Material& material, bool outside, const RgbD& tint
     if (flat.reflectance >= 1) return;
     through = refract(b.geometric_normal, b.to_viewer, eta, flat.cosine_beyond);
   }
-  add_delta(b, {through, tint * ((1 - bent.reflectance) * eta * eta), true, outside});
+  add_delta(b, {at_length(b, through), tint * ((1 - bent.reflectance) * eta * eta), true, outside});
 }
 
 // (e + 2) / (2 pi) cos^e with cos = 1 - chord^2 / 2: exact where the power is steep.
@@ -258,6 +265,16 @@ Bsdf bsdf_at(const Scene& scene, const SurfaceHit& hit) {
       break;
   }
   return b;
+}
+
+SingleDirections::SingleDirections(const Material& material, const SurfaceHit& hit)
+    : geometric_normal(hit.geometric_normal), normal(hit.normal), to_viewer(hit.to_viewer) {
+  const RgbD albedo(hit.albedo);
+  if (material.model == SurfaceModel::mirror) {
+    add_delta(*this, {reflected(*this), albedo});
+  } else {
+    add_glass(*this, material, hit.outside, albedo);
+  }
 }
 
 Vec3 cosine_direction(const Vec3& normal, double u, double v) {

@@ -126,6 +126,23 @@ bool may_have_narrow_lobe(const Material& material);
 /// The BSDF of what a ray has met.
 Bsdf bsdf_at(const Scene& scene, const SurfaceHit& hit);
 
+/// The single directions alone of a hit on a mirror or glass, where they are all there is: those of
+/// bsdf_at() for a small part of its work. Of length 1 but for rounding: normalise the one taken.
+struct SingleDirections {
+  Vec3 geometric_normal, normal, to_viewer;  ///< as in Bsdf
+  std::array<Bsdf::Delta, 2> delta{};
+  int delta_count = 0;
+
+  SingleDirections() = default;
+  explicit SingleDirections(const Bsdf& bsdf) : delta(bsdf.delta), delta_count(bsdf.delta_count) {}
+  /// Requires is_mirror_or_glass(material), the material of `hit`.
+  SingleDirections(const Material& material, const SurfaceHit& hit);
+};
+
+inline bool is_mirror_or_glass(const Material& material) {
+  return material.model == SurfaceModel::mirror || material.model == SurfaceModel::glass;
+}
+
 /// A direction about `normal` with density max(0, n.w) / pi, by two numbers in [0, 1).
 Vec3 cosine_direction(const Vec3& normal, double u, double v);
 

@@ -404,7 +404,10 @@ void PointTracer::trace_caustics(const Scene& scene, const ShadingPoint& point,
     ++counts.specular;
     const auto hit = surface_hit(scene, visibility_, origin, w);
     if (!hit) return;
-    const Bsdf met = bsdf_at(scene, *hit);
+    const Material& material = scene.material[hit->material];
+    const SingleDirections met = is_mirror_or_glass(material)
+                                     ? SingleDirections(material, *hit)
+                                     : SingleDirections(bsdf_at(scene, *hit));
     if (met.delta_count == 0) return;
     PathRandom random(key);
     const PathEnd end =

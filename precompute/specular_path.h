@@ -27,14 +27,20 @@ enum class AtMixed {
   choose  ///< it ends there or goes on at random, whichever keeps the mean
 };
 
-/// From `first`, a hit whose BSDF `at_first` has single directions, along one of them after the
-/// other, each chosen at random by its weight, until a surface that has none, or the open. A path
+/// From `first`, a hit with the single directions `at_first`, along one of them after the other,
+/// each chosen at random by its weight, until a surface that has none, or the open. A path
 /// is given up below 1 % of its light, by Russian roulette that keeps the mean, and for good after
 /// 64 interactions. Light inside thick glass is weakened by its extinction. Adds the rays traced to
 /// `rays`.
 PathEnd follow_specular(const Scene& scene, const Visibility& visibility, const SurfaceHit& first,
-                        const Bsdf& at_first, AtMixed mixed, PathRandom& random,
+                        const SingleDirections& at_first, AtMixed mixed, PathRandom& random,
                         std::int64_t& rays);
+
+inline PathEnd follow_specular(const Scene& scene, const Visibility& visibility,
+                               const SurfaceHit& first, const Bsdf& at_first, AtMixed mixed,
+                               PathRandom& random, std::int64_t& rays) {
+  return follow_specular(scene, visibility, first, SingleDirections(at_first), mixed, random, rays);
+}
 
 /// What is left of `weight` after `distance` (local units) inside the glass of `material`.
 RgbD weakened(const RgbD& weight, const Material& material, const Visibility& visibility,

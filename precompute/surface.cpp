@@ -100,8 +100,7 @@ SurfaceHit surface_at(const Scene& scene, const Visibility& visibility, const Vi
   const Triangle& t = scene.triangle[hit.triangle];
   const Material& material = scene.material[t.material];
   const Spot spot{t, hit.b1, hit.b2};
-  const Vec3 a = visibility.corner(hit.triangle, 0), b = visibility.corner(hit.triangle, 1),
-             c = visibility.corner(hit.triangle, 2);
+  const auto [a, b, c] = visibility.corners(hit.triangle);
   SurfaceHit surface;
   surface.distance = hit.distance;
   surface.material = t.material;

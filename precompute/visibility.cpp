@@ -358,11 +358,14 @@ unsigned Visibility::trace8(const std::array<float, 3>& origin, const float* x, 
   return blocked & lanes;
 }
 
-Vec3 Visibility::corner(std::uint32_t triangle, int corner) const {
+std::array<Vec3, 3> Visibility::corners(std::uint32_t triangle) const {
   const std::size_t place = device_->place_of.empty() ? triangle : device_->place_of[triangle];
-  const std::uint32_t v = device_->corner_index[3 * place + std::size_t(corner)];
-  const float* p = device_->position + 3 * std::size_t{v};
-  return {static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])};
+  std::array<Vec3, 3> corners;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const float* p = device_->position + 3 * std::size_t{device_->corner_index[3 * place + c]};
+    corners[c] = {static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])};
+  }
+  return corners;
 }
 
 }  // namespace haarlight

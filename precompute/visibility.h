@@ -77,7 +77,10 @@ class Visibility {
   bool has_glossy() const { return has_glossy_; }
   bool has_holes() const { return has_holes_; }
   /// Corner 0, 1 or 2 of a triangle as Embree holds it, local.
-  Vec3 corner(std::uint32_t triangle, int corner) const;
+  Vec3 corner(std::uint32_t triangle, int corner) const {
+    return corners(triangle)[static_cast<std::size_t>(corner)];
+  }
+  std::array<Vec3, 3> corners(std::uint32_t triangle) const;
 
  private:
   struct Device;
