@@ -74,6 +74,10 @@ void CompressCommand::run() const {
       static_cast<double>(report.bytes) / (1024.0 * 1024.0),
       static_cast<double>(transport.file_bytes()) / static_cast<double>(report.bytes),
       report.measured_error);
+  if (options.basis == 0 && report.measured_error > options.error) {
+    fmt::print(stderr, "{}: measured error {:.3g}, wanted {:.3g}: more --clusters are needed\n",
+               output.string(), report.measured_error, options.error);
+  }
 }
 
 }  // namespace
@@ -85,24 +89,25 @@ Verb add_compress(CLI::App& verb) {
       ->required();
   add_path(verb, "-o,--output", c.output, "OUT.hlt", "file to write")->required();
   add_number(verb, "--error", c.options.error, 1e-6, 0.999,
-             "picture error to aim at, relative RMSE under the worst built-in lighting; with "
-             "--basis half of it is for entries that are dropped");
+             "most picture error, relative RMSE against FILE under the worst built-in lighting; "
+             "with --basis half of it is for entries that are dropped, and the basis leaves what "
+             "it leaves");
   verb.add_option_function<std::string>(
           "--clusters",
           [&c](const std::string& text) {
             c.options.clusters = 0;
             if (text == "auto") return;
-            c.options.clusters =
-                static_cast<int>(parse_number("--clusters", text, 1, kMostClustersAsked));
+            c.options.clusters = parse_integer("--clusters", text, 1, kMostClustersAsked);
           },
-          "groups of vertices with vectors of their own; auto: one per 100 vertices [auto]")
+          "groups of vertices with vectors of their own; auto: what makes the smallest file, of "
+          "one per 50, 100, 200 or 400 vertices [auto]")
       ->type_name("auto|N");
   verb.add_option_function<std::string>(
           "--basis",
           [&c](const std::string& text) {
             c.options.basis = 0;
             if (text == "auto") return;
-            c.options.basis = static_cast<int>(parse_number("--basis", text, 1, kMostVectors));
+            c.options.basis = parse_integer("--basis", text, 1, kMostVectors);
           },
           fmt::format(
               "vectors a cluster, 1 to {}; auto: as many as --error wants, each cluster its "

@@ -36,14 +36,6 @@ std::vector<std::string> split(const std::string& text, char separator) {
   }
 }
 
-int parse_integer(const std::string& option, const std::string& text, int least, int most) {
-  const std::optional<int> value = whole_text_as<int>(text);
-  if (!value || *value < least || *value > most) {
-    refuse_option(option, text, fmt::format("a whole number, {} to {}", least, most));
-  }
-  return *value;
-}
-
 }  // namespace
 
 void refuse_option(const std::string& option, const std::string& value, const std::string& wanted) {
@@ -134,6 +126,14 @@ std::vector<int> parse_frames(const std::string& option, const std::string& text
   std::sort(frames.begin(), frames.end());
   frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
   return frames;
+}
+
+int parse_integer(const std::string& option, const std::string& text, int least, int most) {
+  const std::optional<int> value = whole_text_as<int>(text);
+  if (!value || *value < least || *value > most) {
+    refuse_option(option, text, fmt::format("a whole number, {} to {}", least, most));
+  }
+  return *value;
 }
 
 double parse_number(const std::string& option, const std::string& text, double least, double most) {

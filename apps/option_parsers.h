@@ -44,6 +44,8 @@ std::pair<int, int> parse_size(const std::string& option, const std::string& tex
 std::vector<int> parse_frames(const std::string& option, const std::string& text, int most);
 /// A finite number in [least, most]; all of the text must be it.
 double parse_number(const std::string& option, const std::string& text, double least, double most);
+/// A whole number in [least, most]; all of the text must be it.
+int parse_integer(const std::string& option, const std::string& text, int least, int most);
 /// "200M" -> 209715200: a positive number with K, M, G or T (powers of 1024) or without.
 std::uint64_t parse_byte_size(const std::string& option, const std::string& text);
 /// "exr,png" -> the words, each one of `choices`.

@@ -16,6 +16,7 @@
 #include "apps/progress_printer.h"
 #include "apps/repairs.h"
 #include "apps/verbs.h"
+#include "core/error.h"
 #include "core/image_io.h"
 #include "core/image_metrics.h"
 #include "cpca/cluster_relighter.h"
@@ -46,6 +47,7 @@ struct RelightCommand {
   std::string save_frames;
   std::optional<double> exposure_ev;
   ClusterRelightOptions clusters;
+  bool basis_terms_asked = false;
   TonemapCurve curve = TonemapCurve::filmic;
   bool no_background = false;
   std::vector<std::string> formats = kFormats;
@@ -96,6 +98,12 @@ void RelightCommand::check() const {
 }
 
 void RelightCommand::check_kind(const Transport& scene) const {
+  if (basis_terms_asked && scene.kind() != TransportKind::clusters) {
+    throw Error(ErrorKind::invalid_argument,
+                fmt::format("{}: not compressed, expected a file made by haarlight compress for "
+                            "--basis-terms",
+                            transport.string()));
+  }
   if (scene.info().mesh) return;
   if (sequence.orbit_degrees != 0) {
     refuse_option("--orbit", fmt::format("{}", sequence.orbit_degrees),
@@ -293,11 +301,11 @@ Verb add_relight(CLI::App& verb) {
   verb.add_option_function<std::string>(
           "--basis-terms",
           [&c](const std::string& text) {
-            c.clusters.basis_terms =
-                text == "all" ? -1
-                : text == "quarter"
-                    ? 0
-                    : static_cast<int>(parse_number("--basis-terms", text, 1, 65536));
+            c.basis_terms_asked = true;
+            c.clusters.basis_terms = text == "all" ? -1
+                                     : text == "quarter"
+                                         ? 0
+                                         : parse_integer("--basis-terms", text, 1, 65536);
           },
           "of a compressed transport: most vectors of a cluster that vertices follow in a frame "
           "[quarter]")

@@ -39,6 +39,8 @@ void print_repairs(const std::filesystem::path& file, const SceneReport& report)
   print_count(file, report.textures_missing, "textures not found, plain colours used");
   print_count(file, report.blended_materials, "blended materials taken as holes or thin walls");
   print_count(file, report.rough_glass, "materials of rough glass taken as smooth glass");
+  print_count(file, report.measured_textures,
+              "base colour textures left out of measured materials: the colour is the table's");
   print_count(file, report.energy_scaled, "materials that reflect more than all light scaled down");
 }
 

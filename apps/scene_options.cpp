@@ -70,7 +70,7 @@ void add_scene_options(CLI::App& verb, SceneOptions& scene, MeshOptions& options
           "--bounces",
           [&scene](const std::string& text) {
             if (text == "auto") return;
-            scene.bounces = static_cast<int>(parse_number("--bounces", text, 0, kMostBounces));
+            scene.bounces = parse_integer("--bounces", text, 0, kMostBounces);
           },
           fmt::format("most reflections between surfaces, 0 to {}; auto: as --effects says [auto]",
                       kMostBounces))
@@ -151,10 +151,10 @@ void set_merl(const std::string& pair, const std::filesystem::path& file, Scene&
   const std::string name = pair.substr(0, at);
   bool found = false;
   std::string names;
-  for (Material& material : scene.material) {
-    names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", material.name);
-    if (material.name != name) continue;
-    set_measured(material, pair.substr(at + 1));
+  for (std::size_t m = 0; m < scene.material.size(); ++m) {
+    names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", scene.material[m].name);
+    if (scene.material[m].name != name) continue;
+    set_measured(scene, m, pair.substr(at + 1));
     found = true;
   }
   if (!found) {
@@ -167,13 +167,13 @@ void set_merl(const std::string& pair, const std::filesystem::path& file, Scene&
 
 StagedScene load_scene(SceneOptions& options, bool say_repairs) {
   StagedScene staged{import_scene(options.scene), {}};
-  if (say_repairs) print_repairs(options.scene, staged.scene.report);
   if (options.view == SceneOptions::View::scene && !staged.scene.camera) {
     throw Error(ErrorKind::missing,
                 fmt::format("{}: has no perspective camera, expected one for --view scene",
                             options.scene.string()));
   }
   for (const std::string& pair : options.merl) set_merl(pair, options.scene, staged.scene);
+  if (say_repairs) print_repairs(options.scene, staged.scene.report);
   for (const Material& material : staged.scene.material) {
     if (material.model != SurfaceModel::measured || options.vertices) continue;
     throw Error(ErrorKind::invalid_argument,

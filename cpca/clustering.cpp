@@ -98,6 +98,7 @@ class Clusterer {
   const ClusteringOptions& options_;
   const Progress& progress_;
   std::size_t dims_;
+  std::size_t wanted_ = 0;                // clusters
   std::vector<std::uint32_t> lit_;        // points that are not the origin
   std::vector<std::uint32_t> of_;         // cluster of each of them
   std::vector<double> left_;              // squared distance from its flat
@@ -334,7 +335,7 @@ void Clusterer::split_worst(std::size_t most) {
     const bool fills = !empty.empty();
     if (fills) {
       to = empty.back();
-    } else if (flat_.size() >= static_cast<std::size_t>(options_.clusters)) {
+    } else if (flat_.size() >= wanted_) {
       return;
     } else {
       flat_.emplace_back();
@@ -362,13 +363,15 @@ Clustering Clusterer::run() {
     out.clusters = points_.count() > 0 ? 1 : 0;
     return out;
   }
-  const bool dark = lit_.size() < points_.count();
-  const auto wanted = std::min(static_cast<std::size_t>(options_.clusters), lit_.size());
+  // Dark points have one of the clusters, or where there is but one their place in it.
+  const bool dark = lit_.size() < points_.count() && options_.clusters > 1;
+  const auto asked = static_cast<std::size_t>(options_.clusters) - (dark ? 1 : 0);
+  wanted_ = std::min(asked, lit_.size());
   left_.assign(lit_.size(), 0.0);
 
   // Where flats begin: k-means.
   // Splits, which make the last quarter, come with iterations.
-  seed(options_.iterations > 0 ? std::max<std::size_t>(1, wanted - wanted / 4) : wanted);
+  seed(options_.iterations > 0 ? std::max<std::size_t>(1, wanted_ - wanted_ / 4) : wanted_);
   report(0.15);
   for (int round = 0; round < kMeansRounds; ++round) {
     gather();
@@ -385,7 +388,7 @@ Clustering Clusterer::run() {
   for (int round = 0; round < options_.iterations; ++round) {
     const int splitting = std::max(1, options_.iterations / 2 - round);
     split_worst(
-        (wanted - std::min(wanted, flat_.size()) + static_cast<std::size_t>(splitting) - 1) /
+        (wanted_ - std::min(wanted_, flat_.size()) + static_cast<std::size_t>(splitting) - 1) /
         static_cast<std::size_t>(splitting));
     means();
     const std::size_t went = assign_to_flats();
@@ -394,7 +397,7 @@ Clustering Clusterer::run() {
     fit_all();
     out.inertia.push_back(inertia());
     report(0.3 + 0.7 * (round + 1) / options_.iterations);
-    if (went == 0 && flat_.size() >= wanted) break;
+    if (went == 0 && flat_.size() >= wanted_) break;
   }
 
   // Numbered by their first point, the empty ones left out.

@@ -12,9 +12,9 @@
 namespace haarlight {
 
 struct ClusteringOptions {
-  int clusters = 400;      ///< >= 1; fewer come out if there are fewer different points, or
-                           ///< if nothing is left to split off: all errors are 0
-  int basis = 8;           ///< dimensions of a cluster's flat while points are shared out
+  int clusters = 400;  ///< >= 1, the most that come out; fewer if there are fewer different points,
+                       ///< or if nothing is left to split off: all errors are 0
+  int basis = 8;       ///< dimensions of a cluster's flat while points are shared out
   int iterations = 12;     ///< most rounds of assignment and PCA
   std::uint64_t seed = 1;  ///< of the first centres
 };
@@ -31,8 +31,8 @@ struct Clustering {
 /// (Sloan and others 2003, "iterative clustered PCA"). Begins with k-means (k-means++, Arthur and
 /// Vassilvitskii 2007) of three quarters of the clusters; the others come from splitting those that
 /// leave most error, which empty ones are filled by as well. Ends when nothing moves. Points at the
-/// origin have a cluster of their own, the last one. Ties go to the smaller number; the same bits
-/// on any number of threads. Throws Error{cancelled}.
+/// origin have a cluster of their own, the last one, where there may be two. Ties go to the smaller
+/// number; the same bits on any number of threads. Throws Error{cancelled}.
 Clustering cluster_points(const Sketch& points, const ClusteringOptions& options,
                           const Progress& progress);
 

@@ -26,8 +26,11 @@
 namespace haarlight {
 namespace {
 
-constexpr int kVerticesPerCluster = 100;
+constexpr int kVerticesPerCluster[] = {50, 100, 200,
+                                       400};  // tried where clusters are ours to choose
 constexpr std::size_t kPilots = 64;
+constexpr int kAims = 5;           // files written at most until the error is what was asked for
+constexpr double kBlockBytes = 6;  // of a stored block beside its 16 entries, about
 constexpr std::size_t kMostByError = 96;  // vectors a cluster, where the error decides
 constexpr int kClusteringBasis = 8;       // axes of a flat while vertices are shared out
 
@@ -72,8 +75,13 @@ class Compressor {
     return std::span(weights_.vertex).subspan(weights_.first_vertex[c], weights_.vertices_of(c));
   }
   Progress part(double from, double to) const;
-  void share_out();
-  void choose_vectors();
+  void share_out(int clusters, const Progress& progress);
+  void look_at_pilots(const Progress& progress);
+  void choose_clusters();
+  void choose_vectors(double error);
+  double estimated_bytes() const;
+  void set_tints();
+  bool write(bool whatever_error);
   void find_vectors(TransportWriter& writer);
   void keep_weights(std::size_t c, const ClusterBasis& basis);
   void measure(std::span<const double> shown);
@@ -88,6 +96,10 @@ class Compressor {
   const std::vector<std::vector<float>>& lightings_;
   std::size_t terms_;
   Sketch sketch_;
+  std::vector<std::vector<double>> sigma_;  // [cluster], estimated singular values
+  VectorTuning tuning_{lightings_};
+  std::size_t most_ = options_.basis > 0 ? static_cast<std::size_t>(options_.basis) : kMostByError;
+  double cut_ = 0;
   ClusterWeights weights_;
   std::vector<std::size_t> weight_begin_;
   float threshold_ = 0;
@@ -103,28 +115,24 @@ Progress Compressor::part(double from, double to) const {
 }
 
 // Vertices to clusters.
-void Compressor::share_out() {
+void Compressor::share_out(int clusters, const Progress& progress) {
   const std::size_t vertices = rows_.vertices();
-  const int basis = options_.basis > 0 ? options_.basis : 32;
-  const int dims = std::clamp((4 * basis + 63) / 64 * 64, 128, 512);
-  sketch_ = sketch_rows(rows_, dims, options_.seed, part(0, kSketched));
   ClusteringOptions clustering;
-  clustering.clusters =
-      options_.clusters > 0
-          ? options_.clusters
-          : std::max(1, static_cast<int>(vertices / static_cast<std::size_t>(kVerticesPerCluster)));
-  clustering.basis = std::min(kClusteringBasis, basis);
+  clustering.clusters = clusters;
+  clustering.basis =
+      options_.basis > 0 ? std::min(kClusteringBasis, options_.basis) : kClusteringBasis;
   clustering.iterations = options_.iterations;
   clustering.seed = options_.seed;
-  const Clustering found = cluster_points(sketch_, clustering, part(kSketched, kClustered));
+  const Clustering found = cluster_points(sketch_, clustering, progress);
   report_.clusters = found.clusters;
   report_.inertia = found.inertia;
 
-  const auto clusters = static_cast<std::size_t>(found.clusters);
+  const auto count = static_cast<std::size_t>(found.clusters);
+  weights_ = {};
   weights_.bits = options_.bits;
-  weights_.first_vertex.assign(clusters + 1, 0);
+  weights_.first_vertex.assign(count + 1, 0);
   for (const std::uint32_t c : found.cluster) ++weights_.first_vertex[c + 1];
-  for (std::size_t c = 0; c < clusters; ++c) {
+  for (std::size_t c = 0; c < count; ++c) {
     weights_.first_vertex[c + 1] += weights_.first_vertex[c];
   }
   std::vector<std::uint32_t> next(weights_.first_vertex.begin(), weights_.first_vertex.end() - 1);
@@ -134,45 +142,90 @@ void Compressor::share_out() {
   }
 }
 
-// How many vectors each cluster has, and what is small enough to be dropped of them.
-void Compressor::choose_vectors() {
+// A few clusters are taken apart as widely as any choice wants them.
+void Compressor::look_at_pilots(const Progress& progress) {
   const auto clusters = static_cast<std::size_t>(report_.clusters);
-  const std::size_t most =
-      options_.basis > 0 ? static_cast<std::size_t>(options_.basis) : kMostByError;
-  std::vector<std::vector<double>> sigma(clusters);
+  sigma_.assign(clusters, {});
   parallel_for(static_cast<int>(clusters), [&](int i) {
     const auto c = static_cast<std::size_t>(i);
-    sigma[c] = estimated_sizes(sketch_, members(c));
-    for (double& s : sigma[c]) s *= std::sqrt(static_cast<double>(weights_.vertices_of(c)));
+    sigma_[c] = estimated_sizes(sketch_, members(c));
+    for (double& s : sigma_[c]) s *= std::sqrt(static_cast<double>(weights_.vertices_of(c)));
   });
-
-  // A few clusters are taken apart as widely as any choice wants them.
   const std::size_t step = std::max<std::size_t>(1, clusters / kPilots);
   std::vector<std::size_t> pilots;
   for (std::size_t c = step / 2; c < clusters; c += step) pilots.push_back(c);
   std::vector<ClusterBasis> bases(pilots.size());
   parallel_for(static_cast<int>(pilots.size()), [&](int i) {
     const auto p = static_cast<std::size_t>(i);
-    bases[p] = find_basis(rows_, sketch_, members(pilots[p]), most, lightings_);
+    bases[p] = find_basis(rows_, sketch_, members(pilots[p]), most_, lightings_);
   });
-  VectorTuning tuning(lightings_);
+  tuning_.clear();
   for (std::size_t p = 0; p < pilots.size(); ++p) {
-    tuning.add(bases[p], members(pilots[p]).size(), sigma[pilots[p]]);
+    tuning_.add(bases[p], members(pilots[p]).size(), sigma_[pilots[p]]);
   }
+  if (progress && !progress(1)) throw Error(ErrorKind::cancelled, "compression stopped on request");
+}
+
+// The number of clusters with the smallest file, as far as a few of them tell.
+void Compressor::choose_clusters() {
+  if (options_.clusters > 0) {
+    share_out(options_.clusters, part(kSketched, kClustered));
+    look_at_pilots(part(kClustered, kTuned));
+    return;
+  }
+  const auto vertices = static_cast<int>(rows_.vertices());
+  double least = 0, least_left = 0;
+  int best = 0, tried = 0;
+  const auto look_at = [&](int clusters, double from, double to) {
+    share_out(clusters, part(from, 0.7 * to + 0.3 * from));
+    look_at_pilots(part(from, to));
+    choose_vectors(options_.error);
+  };
+  constexpr double kEach = (kTuned - kSketched) / (std::size(kVerticesPerCluster) + 1.0);
+  std::vector<int> counts;
+  for (const int size : kVerticesPerCluster) {
+    const int clusters = std::max(1, vertices / size);
+    if (counts.empty() || counts.back() != clusters) counts.push_back(clusters);
+  }
+  for (const int clusters : counts) {
+    const double from = kSketched + kEach * tried++;
+    look_at(clusters, from, from + kEach);
+    // Where the error is out of reach, what comes nearest; else the smallest file.
+    const double bytes = estimated_bytes();
+    const double left = std::max(report_.basis_error - options_.error, 0.0);
+    if (best == 0 || left < least_left || (left == least_left && bytes < least)) {
+      least = bytes, least_left = left, best = clusters;
+    }
+  }
+  if (counts.back() != best) look_at(best, kTuned - kEach, kTuned);
+}
+
+// Of the file, with the vectors and the threshold chosen.
+double Compressor::estimated_bytes() const {
+  const VectorTuning::Kept kept = tuning_.kept(cut_, most_, threshold_);
+  const double all = kept.vectors > 0 ? weights_.vectors() / kept.vectors : 0;
+  return all * kept.entries * (1 + kBlockBytes / static_cast<double>(kBlockRows)) +
+         static_cast<double>(weight_begin_.back()) * options_.bits / 8;
+}
+
+// How many vectors each cluster has, and what is small enough to be dropped of them, so that the
+// picture is about `error` off.
+void Compressor::choose_vectors(double error) {
+  const auto clusters = static_cast<std::size_t>(report_.clusters);
   // Half of the squared error to vectors left out, where they are ours to choose; the rest to
   // entries dropped, to rounding, and to clusters that are not like the few that were looked at.
-  double cut = 0;
-  double left = 0.5 * options_.error;
+  cut_ = 0;
+  double left = 0.5 * error;
   if (options_.basis == 0) {
-    cut = tuning.cut_for(0.75 * options_.error, most);
-    left = 0.4 * options_.error;
+    cut_ = tuning_.cut_for(0.75 * error, most_);
+    left = 0.4 * error;
   }
-  threshold_ = tuning.threshold_for(left, cut, most);
-  report_.basis_error = tuning.basis_error(cut, most);
+  threshold_ = tuning_.threshold_for(left, cut_, most_);
+  report_.basis_error = tuning_.basis_error(cut_, most_);
 
   weights_.first_vector.assign(1, 0);
   for (std::size_t c = 0; c < clusters; ++c) {
-    const std::size_t count = std::min(vectors_above(sigma[c], cut, most), members(c).size());
+    const std::size_t count = std::min(vectors_above(sigma_[c], cut_, most_), members(c).size());
     weights_.first_vector.push_back(weights_.first_vector.back() +
                                     static_cast<std::uint32_t>(count));
   }
@@ -182,7 +235,6 @@ void Compressor::choose_vectors() {
   weight_begin_ = weights_.weight_begin();
   weights_.weight.assign(weight_begin_.back(), 0);
   report_.vectors = weights_.vectors();
-  if (!part(kClustered, kTuned)(1)) throw Error(ErrorKind::cancelled, "compression stopped");
 }
 
 void Compressor::keep_weights(std::size_t c, const ClusterBasis& basis) {
@@ -236,6 +288,8 @@ void Compressor::find_vectors(TransportWriter& writer) {
 
 // Vertices' sums as the file has them against the transport's, under the built-in lightings.
 void Compressor::measure(std::span<const double> shown) {
+  report_.of_lightings.clear();
+  report_.measured_error = 0;
   const auto clusters = static_cast<std::size_t>(report_.clusters);
   const std::size_t lights = lightings_.size();
   std::vector<std::vector<double>> error(clusters), energy(clusters);
@@ -293,13 +347,9 @@ std::string Compressor::describe() const {
   return meta.dump(2);
 }
 
-CompressReport Compressor::run() {
-  share_out();
-  choose_vectors();
-
-  TransportInfo info = transport_.info();
-  info.kind = TransportKind::clusters;
-  info.meta.clear();
+// What factors each vertex' sums have beside those of its cluster.
+void Compressor::set_tints() {
+  weights_.tint.clear();
   if (rows_.vertices() > 0) {
     bool tinted = false;
     for (const std::uint32_t v : weights_.vertex) {
@@ -325,6 +375,13 @@ CompressReport Compressor::run() {
           ClusterWeights::tint_bits({1, 1, 1}));
     }
   }
+}
+
+// Whether the file was written: it is not if its error is too large, unless told so.
+bool Compressor::write(bool whatever_error) {
+  TransportInfo info = transport_.info();
+  info.kind = TransportKind::clusters;
+  info.meta.clear();
   info.clusters = std::make_shared<const ClusterWeights>(weights_);
   TransportWriterOptions writing;
   // What is small has been dropped before rows were brought to one size.
@@ -333,6 +390,10 @@ CompressReport Compressor::run() {
   TransportWriter writer(file_, info, writing);
   try {
     find_vectors(writer);
+    if (!whatever_error && report_.measured_error > options_.error) {
+      writer.discard();
+      return false;
+    }
     FinishOptions finish;
     finish.clusters = std::make_shared<const ClusterWeights>(weights_);
     finish.measured_error = report_.measured_error;
@@ -342,6 +403,24 @@ CompressReport Compressor::run() {
   } catch (...) {
     writer.discard();
     throw;
+  }
+  return true;
+}
+
+CompressReport Compressor::run() {
+  const int basis = options_.basis > 0 ? options_.basis : 32;
+  const int dims = std::clamp((4 * basis + 63) / 64 * 64, 128, 512);
+  sketch_ = sketch_rows(rows_, dims, options_.seed, part(0, kSketched));
+  choose_clusters();
+  const bool reachable = options_.basis == 0 && tuning_.basis_error(0, most_) <= options_.error;
+  double aim = options_.error;
+  for (int left = kAims; left > 0; --left) {
+    choose_vectors(aim);
+    set_tints();
+    // What vectors cannot reach is left; else it is the last try that may leave too much, and the
+    // one in which nothing is left out any more.
+    if (write(!reachable || left == 1 || (cut_ == 0 && threshold_ == 0))) break;
+    aim *= std::min(0.95, 0.97 * options_.error / report_.measured_error);
   }
   return std::move(report_);
 }

@@ -29,6 +29,11 @@ int level_of(float rms) {
 VectorTuning::VectorTuning(const std::vector<std::vector<float>>& lightings)
     : lightings_(lightings), energy_(lightings.size(), 0.0) {}
 
+void VectorTuning::clear() {
+  clusters_.clear();
+  std::fill(energy_.begin(), energy_.end(), 0.0);
+}
+
 void VectorTuning::add(const ClusterBasis& basis, std::size_t vertices, std::vector<double> sigma) {
   Cluster c;
   c.count = basis.count;
@@ -42,6 +47,7 @@ void VectorTuning::add(const ClusterBasis& basis, std::size_t vertices, std::vec
   // of like size.
   std::vector<float> sums(basis.count * parts * lights, 0.0f);
   std::vector<float> by_level(basis.count * parts * lights * (kLevels + 1), 0.0f);
+  c.entries.assign(basis.count + 1, std::vector<double>(kLevels + 1, 0.0));
   for (std::size_t p = 0; p < parts; ++p) {
     for (std::size_t first = 0; first < basis.count; first += kBlock) {
       const std::size_t end = std::min(first + kBlock, basis.count);
@@ -56,6 +62,7 @@ void VectorTuning::add(const ClusterBasis& basis, std::size_t vertices, std::vec
             static_cast<std::size_t>(level_of(std::sqrt(energy / static_cast<float>(end - first))));
         for (std::size_t i = first; i < end; ++i) {
           const float b = basis.vector[i * size + p * columns + j];
+          ++c.entries[i + 1][level];
           for (std::size_t l = 0; l < lights; ++l) {
             const float part = b * lightings_[l][j];
             sums[(i * parts + p) * lights + l] += part;
@@ -70,7 +77,13 @@ void VectorTuning::add(const ClusterBasis& basis, std::size_t vertices, std::vec
     for (int t = 1; t <= kLevels; ++t) level[t] += level[t - 1];
   }
 
-  // Errors, vector after vector.
+  for (std::size_t i = 1; i <= basis.count; ++i) {
+    for (std::size_t t = 0; t <= kLevels; ++t) c.entries[i][t] += c.entries[i - 1][t];
+  }
+
+  // Errors, vector after vector. A grey sum stands for three channels whose squared colours add up
+  // to 3.
+  const double share = basis.channels == 1 ? 3 : 1;
   c.left.assign(basis.count + 1, std::vector<double>(lights, 0.0));
   c.dropped.assign(basis.count + 1,
                    std::vector<std::vector<double>>(kLevels, std::vector<double>(lights, 0.0)));
@@ -79,24 +92,38 @@ void VectorTuning::add(const ClusterBasis& basis, std::size_t vertices, std::vec
     for (std::size_t v = 0; v < vertices; ++v) {
       for (std::size_t p = 0; p < parts; ++p) {
         double rest = static_cast<double>(basis.exact[(l * vertices + v) * parts + p]);
-        energy_[l] += rest * rest;
-        c.left[0][l] += rest * rest;
+        energy_[l] += share * rest * rest;
+        c.left[0][l] += share * rest * rest;
         std::fill(lost.begin(), lost.end(), 0.0);
         for (std::size_t i = 0; i < basis.count; ++i) {
           const double w = basis.weight[i * vertices + v];
           const std::size_t at = (i * parts + p) * lights + l;
           rest -= w * static_cast<double>(sums[at]);
-          c.left[i + 1][l] += rest * rest;
+          c.left[i + 1][l] += share * rest * rest;
           const float* level = by_level.data() + at * (kLevels + 1);
           for (std::size_t t = 0; t < kLevels; ++t) {
             lost[t] += w * static_cast<double>(level[t]);
-            c.dropped[i + 1][t][l] += lost[t] * lost[t];
+            c.dropped[i + 1][t][l] += share * lost[t] * lost[t];
           }
         }
       }
     }
   }
   clusters_.push_back(std::move(c));
+}
+
+VectorTuning::Kept VectorTuning::kept(double cut, std::size_t most, float threshold) const {
+  Kept kept;
+  for (const Cluster& c : clusters_) {
+    if (c.count == 0) continue;
+    const std::size_t s = chosen(c, cut, most);
+    kept.vectors += static_cast<double>(s);
+    for (int t = 0; t <= kLevels; ++t) {
+      if (level_threshold(t) <= threshold) continue;  // they fall out
+      kept.entries += c.entries[s][static_cast<std::size_t>(t)];
+    }
+  }
+  return kept;
 }
 
 std::size_t vectors_above(const std::vector<double>& sigma, double cut, std::size_t most) {

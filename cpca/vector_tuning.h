@@ -15,6 +15,8 @@ class VectorTuning {
  public:
   explicit VectorTuning(const std::vector<std::vector<float>>& lightings);
 
+  /// Forgets all clusters.
+  void clear();
   /// Adds a cluster of `vertices` vertices, its basis as wide as any choice, and its estimated
   /// singular values.
   void add(const ClusterBasis& basis, std::size_t vertices, std::vector<double> sigma);
@@ -30,6 +32,12 @@ class VectorTuning {
   /// vectors that `cut` and `most` choose; 0 if none.
   float threshold_for(double error, double cut, std::size_t most) const;
 
+  /// Entries of those vectors that such a threshold keeps, and how many vectors they are.
+  struct Kept {
+    double entries = 0, vectors = 0;
+  };
+  Kept kept(double cut, std::size_t most, float threshold) const;
+
  private:
   struct Cluster {
     std::size_t count = 0;      // vectors
@@ -38,6 +46,8 @@ class VectorTuning {
     std::vector<std::vector<double>> left;
     // Squared error of leaving out entries below threshold level t, [s][t][lighting].
     std::vector<std::vector<std::vector<double>>> dropped;
+    // Entries of the first s vectors that fall out at level t, [s][t].
+    std::vector<std::vector<double>> entries;
   };
   std::size_t chosen(const Cluster& cluster, double cut, std::size_t most) const;
   double worst(const std::vector<double>& error) const;

@@ -140,13 +140,29 @@ Material import_gltf_material(const GltfMaterial& numbers, const aiMaterial& in,
   return out;
 }
 
-void set_measured(Material& material, const std::filesystem::path& file) {
+void set_measured(Scene& scene, std::size_t m, const std::filesystem::path& file) {
+  const Material& old = scene.material[m];
   Material out;
-  out.name = material.name;
+  out.name = old.name;
   out.model = SurfaceModel::measured;
   out.albedo = {1, 1, 1};
   out.measured = std::make_shared<const MeasuredBrdf>(read_merl(file));
-  material = out;
+  out.normal_texture = old.normal_texture;
+  out.normal_map = old.normal_map;
+  out.normal_scale = old.normal_scale;
+  out.alpha_cutoff = old.alpha_cutoff;
+  if (old.alpha_cutoff > 0 && old.texture >= 0) {
+    const auto base = static_cast<std::size_t>(old.texture);
+    Image white(scene.texture[base].width, scene.texture[base].height);
+    std::fill(white.pixels.begin(), white.pixels.end(), Rgb{1, 1, 1});
+    out.texture = static_cast<int>(scene.texture.size());
+    out.map = old.map;
+    scene.texture.push_back(std::move(white));
+    scene.alpha.resize(scene.texture.size());
+    scene.alpha.back() = scene.alpha[base];
+  }
+  if (old.texture >= 0) ++scene.report.measured_textures;
+  scene.material[m] = out;
 }
 
 Material import_obj_material(const aiMaterial& in, TextureImport& textures, const Scene& scene,

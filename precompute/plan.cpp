@@ -131,7 +131,10 @@ Plan make_plan(const Scene& scene, const SourceMaker& source, std::span<const st
   possible.bounces = lone_convex || !facts.reflects ? 0 : kMostBounces;
   // Seen from anywhere, mirrors are narrow lobes.
   const bool blurred = options.vertices && options.terms_per_vertex > 1;
-  possible.gloss = facts.glossy_area > 0 || blurred;
+  // Tables of BRDFs are shown by their terms, which belong to gloss; the probe sees their mean
+  // alone.
+  const bool tables = options.vertices && facts.measured_area > 0;
+  possible.gloss = facts.glossy_area > 0 || blurred || tables;
   possible.specular = facts.specular_area > 0;
   possible.caustics = facts.specular_area > 0 && !lone_convex;
   possible.color = facts.colored;
@@ -230,20 +233,39 @@ Plan make_plan(const Scene& scene, const SourceMaker& source, std::span<const st
   judge("color", &Effects::color, possible.color,
         "colours do not factor out of all rows: three channels there",
         "one colour factors out: one channel, a third of the bytes");
-  const int terms = facts.glossiest < 0
-                        ? 0
-                        : brdf_terms(scene.material[static_cast<std::size_t>(facts.glossiest)],
-                                     std::max(options.error, 1e-3));
-  judge("gloss", &Effects::gloss, possible.gloss,
-        facts.glossy_area == 0
-            ? fmt::format("{} of the surface are mirrors, blurred lobes at vertices",
-                          percent(facts.specular_area))
-            : fmt::format("{} of the surface; seen from all sides the narrowest lobe is worth {}",
-                          percent(facts.glossy_area),
-                          terms > kMostBrdfTerms
-                              ? fmt::format("more than K = {} terms", kMostBrdfTerms)
-                              : fmt::format("K = {} terms", terms)),
-        "no material has a lobe");
+  const double brdf_error = std::max(options.error, 1e-3);
+  const int terms =
+      facts.glossiest < 0
+          ? 0
+          : brdf_terms(scene.material[static_cast<std::size_t>(facts.glossiest)], brdf_error);
+  const auto worth = [](int k) {
+    return k > kMostBrdfTerms ? fmt::format("more than K = {} terms", kMostBrdfTerms)
+                              : fmt::format("K = {} terms", k);
+  };
+  if (tables) {
+    const BrdfSpectrum table(scene.material[static_cast<std::size_t>(facts.measured)], false);
+    // What one term leaves of a table, by its share of the surface, beside what lobes bring.
+    const double left = facts.measured_area * table.error(1);
+    Effects without = possible;
+    without.gloss = false;
+    const double lobes = facts.glossy_area > 0 ? error_of(without) : 0;
+    add("gloss", true,
+        fmt::format(
+            "measured BRDFs are {} of the surface; seen from all sides the largest is worth "
+            "{}{}",
+            percent(facts.measured_area), worth(table.terms_for(brdf_error, kMostBrdfTerms)),
+            facts.glossy_area > 0 ? fmt::format(", lobes are {} more", percent(facts.glossy_area))
+                                  : std::string()),
+        std::hypot(left, lobes));
+  } else {
+    judge("gloss", &Effects::gloss, possible.gloss,
+          facts.glossy_area == 0
+              ? fmt::format("{} of the surface are mirrors, blurred lobes at vertices",
+                            percent(facts.specular_area))
+              : fmt::format("{} of the surface; seen from all sides the narrowest lobe is worth {}",
+                            percent(facts.glossy_area), worth(terms)),
+          "no material has a lobe");
+  }
   judge("specular", &Effects::specular, possible.specular,
         fmt::format("mirrors and glass are {} of the surface", percent(facts.specular_area)),
         "no mirrors, no glass");
@@ -255,13 +277,14 @@ Plan make_plan(const Scene& scene, const SourceMaker& source, std::span<const st
     for (const EffectEstimate& r : plan.rows) {
       if (r.effect == "gloss" || r.effect == "specular") error = std::max(error, r.error);
     }
-    const bool varies = facts.glossy_area + facts.specular_area > 0;
+    const double varying = facts.glossy_area + facts.specular_area + facts.measured_area;
+    const bool varies = varying > 0;
     add("view dependence", options.vertices && varies,
         !varies ? "all materials are diffuse"
         : options.vertices
             ? fmt::format("{} of the surface looks different from each side: {} term{} a vertex",
-                          percent(facts.glossy_area + facts.specular_area),
-                          options.terms_per_vertex, options.terms_per_vertex == 1 ? "" : "s")
+                          percent(varying), options.terms_per_vertex,
+                          options.terms_per_vertex == 1 ? "" : "s")
             : "the view is fixed: it is in the rows",
         options.vertices ? error : 0);
   }

@@ -92,6 +92,7 @@ struct SceneReport {
   std::int64_t textures_missing = 0;   ///< named by the file, not there: the plain colour is used
   std::int64_t blended_materials = 0;  ///< alpha blending: taken as holes below one half
   std::int64_t rough_glass = 0;        ///< transmission with roughness: passes as through smooth
+  std::int64_t measured_textures = 0;  ///< base colour textures of materials that became measured
   std::int64_t energy_scaled = 0;      ///< materials that reflected more than all: scaled to all
 };
 

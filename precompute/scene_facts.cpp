@@ -45,7 +45,7 @@ SceneFacts scene_facts(const Scene& scene) {
   }
   for (const Rgb& t : scene.tint) tinted = tinted || is_colored(RgbD(t));
 
-  double narrowest = 1e9;
+  double narrowest = 1e9, widest_table = 0;
   for (std::size_t m = 0; m < scene.material.size(); ++m) {
     if (!(area[m] > 0)) continue;
     const Material& material = scene.material[m];
@@ -81,6 +81,10 @@ SceneFacts scene_facts(const Scene& scene) {
         narrowest = b.lobe_half_width();
         facts.glossiest = static_cast<int>(m);
       }
+    }
+    if (material.measured) {
+      facts.measured_area += share;
+      if (share > widest_table) widest_table = share, facts.measured = static_cast<int>(m);
     }
     if (single > 0 || has_single_directions(material)) facts.specular_area += share;
   }

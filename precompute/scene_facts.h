@@ -14,7 +14,9 @@ struct SceneFacts {
   double glossy_area = 0;    ///< share of the surface with a lobe
   double specular_area = 0;  ///< share with single directions
   bool has_glass = false;    ///< anything that light passes
+  double measured_area = 0;  ///< share that is tables of a BRDF
   int glossiest = -1;        ///< material with the narrowest lobe, or none
+  int measured = -1;         ///< the table that covers most, or none
 };
 
 SceneFacts scene_facts(const Scene& scene);

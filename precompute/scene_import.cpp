@@ -77,11 +77,11 @@ void add_materials(const aiScene& file, FileType type, const std::vector<GltfMat
                 ? import_gltf_material(numbers[m], in, textures, scene, scene.report)
                 : import_obj_material(in, textures, scene, scene.report);
       out.name = name;
-      if (type == FileType::gltf && !numbers[m].measured.empty()) {
-        set_measured(out, folder / numbers[m].measured);
-      }
     }
     scene.material.push_back(out);
+    if (!is_default && type == FileType::gltf && !numbers[m].measured.empty()) {
+      set_measured(scene, scene.material.size() - 1, folder / numbers[m].measured);
+    }
   }
 }
 

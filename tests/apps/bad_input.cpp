@@ -89,7 +89,9 @@ TEST_F(BadInput, CompressWantsATransportOfVertices) {
        std::vector<std::pair<std::string, std::string>>{{"--clusters", "0"},
                                                         {"--clusters", "100000"},
                                                         {"--clusters", "many"},
+                                                        {"--clusters", "2.5"},
                                                         {"--basis", "0"},
+                                                        {"--basis", "3.7"},
                                                         {"--basis", "257"},
                                                         {"--error", "0"},
                                                         {"--weight-bits", "12"}}) {
@@ -109,8 +111,15 @@ TEST_F(BadInput, CompressWantsATransportOfVertices) {
       run({"relight", "c.hlt", "--env", "room.exr", "--frames", "4", "--stop", "2", "--size",
            "32x24", "--basis-terms", "1", "--against-reference", "--orbit", "30", "-o", "out"});
   EXPECT_EQ(result.code, 0) << result.err;
-  result = run({"relight", "c.hlt", "--env", "room.exr", "--basis-terms", "0", "-o", "out"});
-  EXPECT_EQ(result.code, 2) << result.err;
+  for (const char* terms : {"0", "1.5"}) {
+    result = run({"relight", "c.hlt", "--env", "room.exr", "--basis-terms", terms, "-o", "out"});
+    EXPECT_EQ(result.code, 2) << result.err;
+  }
+  for (const char* plain : {"mesh.hlt", "table.hlt"}) {
+    expect_stated_error(
+        {"relight", plain, "--env", "room.exr", "--basis-terms", "quarter", "-o", "out"},
+        {plain, "not compressed", "--basis-terms"});
+  }
 }
 
 TEST_F(BadInput, GoodInputIsTaken) {

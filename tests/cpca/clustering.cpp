@@ -90,9 +90,14 @@ TEST(Clustering, PointsAtTheOriginAreApart) {
   Sketch points = points_on_flats(2, 2, 10, 0, 6);
   std::fill_n(points.value.begin() + 64 * 5, 64, 0.0f);
   std::fill_n(points.value.begin() + 64 * 15, 64, 0.0f);
-  const Clustering found = cluster_points(points, {.clusters = 2, .basis = 2}, {});
+  const Clustering found = cluster_points(points, {.clusters = 3, .basis = 2}, {});
   ASSERT_EQ(found.clusters, 3);
   for (std::size_t i = 0; i < 20; ++i) EXPECT_EQ(found.cluster[i] == 2, i == 5 || i == 15) << i;
+
+  const Clustering one = cluster_points(points, {.clusters = 1, .basis = 2}, {});
+  EXPECT_EQ(one.clusters, 1);
+  EXPECT_EQ(one.cluster, std::vector<std::uint32_t>(20, 0));
+  EXPECT_EQ(cluster_points(points, {.clusters = 2, .basis = 2}, {}).clusters, 2);
 
   const Sketch nothing{64, std::vector<float>(64 * 7, 0.0f)};
   const Clustering dark = cluster_points(nothing, {.clusters = 3}, {});

@@ -1,6 +1,7 @@
 haarlight_test(cpca/principal haarlight_cpca)
 haarlight_test(cpca/clustering haarlight_cpca)
 haarlight_test(cpca/cluster_basis haarlight_cpca)
+haarlight_test(cpca/vector_tuning haarlight_cpca)
 haarlight_test(cpca/compress haarlight_cpca nlohmann_json::nlohmann_json)
 haarlight_test(cpca/cluster_relighter haarlight_cpca)
 haarlight_test(cpca/weight_kernel haarlight_cpca)

@@ -16,6 +16,7 @@
 #include "data_gen/merl.h"
 #include "precompute/bsdf.h"
 #include "precompute/isotropic_brdf.h"
+#include "precompute/material_import.h"
 #include "precompute/measured_brdf.h"
 #include "precompute/random.h"
 #include "precompute/surface.h"
@@ -298,6 +299,42 @@ Material measured(const MeasuredBrdf& brdf) {
   m.albedo = {1, 1, 1};
   m.measured = std::make_shared<const MeasuredBrdf>(brdf);
   return m;
+}
+
+TEST(MeasuredBrdf, MaterialsKeepNormalsAndHolesAndNotTheirColour) {
+  const TemporaryFolder folder;
+  data_gen::write_merl(folder.path() / "a.binary", {}, {4, 3, 2});
+  Scene scene;
+  scene.texture.push_back(Image(2, 1));
+  scene.texture[0].pixels = {{0.2f, 0.3f, 0.4f}, {0.5f, 0.6f, 0.7f}};
+  scene.texture.push_back(Image(1, 1));
+  scene.alpha = {{0.25f, 0.75f}};  // of the first; the other has none
+  Material leaf;
+  leaf.name = "leaf";
+  leaf.texture = 0;
+  leaf.map.second = true;
+  leaf.alpha_cutoff = 0.5f;
+  leaf.normal_texture = 1;
+  leaf.normal_scale = 0.7f;
+  Material wall = leaf;
+  wall.alpha_cutoff = 0;
+  scene.material = {leaf, wall};
+  for (std::size_t m = 0; m < 2; ++m) {
+    set_measured(scene, m, folder.path() / "a.binary");
+    EXPECT_EQ(scene.material[m].model, SurfaceModel::measured);
+    EXPECT_EQ(scene.material[m].name, "leaf");
+    EXPECT_EQ(scene.material[m].normal_texture, 1);
+    EXPECT_EQ(scene.material[m].normal_scale, 0.7f);
+  }
+  const Material& cut = scene.material[0];
+  EXPECT_EQ(cut.alpha_cutoff, 0.5f);
+  ASSERT_EQ(cut.texture, 2);
+  EXPECT_TRUE(cut.map.second);
+  EXPECT_EQ(scene.texture[2].pixels, (std::vector<Rgb>{{1, 1, 1}, {1, 1, 1}}));
+  ASSERT_EQ(scene.alpha.size(), 3u);
+  EXPECT_EQ(scene.alpha[2], scene.alpha[0]);
+  EXPECT_EQ(scene.material[1].texture, -1);
+  EXPECT_EQ(scene.report.measured_textures, 2);
 }
 
 TEST(MeasuredBrdf, TablesAreReadAsTheyWereMade) {

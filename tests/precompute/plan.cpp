@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "data_gen/merl.h"
+#include "precompute/material_import.h"
 #include "precompute/plan_scene.h"
 #include "precompute/precompute.h"
 #include "precompute/precompute_mesh.h"
@@ -179,6 +181,22 @@ TEST(Plan, MirrorsCallForSpecularAndCaustics) {
   EXPECT_TRUE(plan.effects.caustics);
   EXPECT_GT(row(plan, "specular").error, 0.05);
   EXPECT_GT(row(plan, "caustics").error, 0.01);
+}
+
+// A table of a BRDF looks different from each side as a lobe does, which no probe of a fixed view
+// sees.
+TEST(Plan, MeasuredMaterialsCallForTerms) {
+  const TemporaryFolder folder;
+  data_gen::write_merl(folder.path() / "a.binary", {}, {40, 30, 40});
+  Scene scene = room({0.5f, 0.5f, 0.5f});
+  set_measured(scene, 0, folder.path() / "a.binary");
+  const Plan plan = plan_mesh(scene, quick());
+  EXPECT_TRUE(plan.effects.gloss);
+  EXPECT_TRUE(row(plan, "gloss").needed);
+  EXPECT_GT(row(plan, "gloss").error, 0.01);
+  EXPECT_NE(row(plan, "gloss").why.find("100 %"), std::string::npos) << row(plan, "gloss").why;
+  EXPECT_TRUE(row(plan, "view dependence").needed);
+  EXPECT_GT(row(plan, "view dependence").error, 0.01);
 }
 
 // What is left out stays below half the error allowed, whatever that is.

@@ -27,7 +27,7 @@ haarlight_test(precompute/transport_against_reference haarlight_reference haarli
 haarlight_test(precompute/precompute_mesh haarlight_precompute)
 haarlight_test(precompute/subdivide haarlight_precompute)
 haarlight_test(precompute/vertex_sampler haarlight_precompute)
-haarlight_test(precompute/plan haarlight_precompute)
+haarlight_test(precompute/plan haarlight_precompute haarlight_data_gen)
 target_link_libraries(test_precompute_plan PRIVATE nlohmann_json::nlohmann_json)
 haarlight_test(precompute/brdf_factors haarlight_precompute haarlight_data_gen)
 haarlight_test(precompute/vertex_terms haarlight_precompute haarlight_data_gen haarlight_reference)

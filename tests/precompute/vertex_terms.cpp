@@ -316,9 +316,9 @@ TEST(VertexTerms, MetalsCoatsAndTablesAreShownToo) {
   }
   // A lacquer by its table against itself with fewer terms: what is left goes down as stated.
   data_gen::write_merl(folder / "a.binary", {}, {60, 45, 60});
-  Material table;
-  set_measured(table, folder / "a.binary");
-  const Scene scene = ball_scene(table);
+  Scene scene = ball_scene(metal);
+  set_measured(scene, 0, folder / "a.binary");
+  const Material& table = scene.material[0];
   precompute_mesh(scene, view_of(1), mesh_options(25, 0), folder / "many.hlt");
   precompute_mesh(scene, view_of(1), mesh_options(9, 0), folder / "few.hlt");
   const auto light = coefficients(sky_light(2));
