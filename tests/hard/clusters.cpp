@@ -75,7 +75,7 @@ TEST(HardCases, Row25_FewerPointsThanDimensions) {
   for (const Eigen::Index n : {1, 2, 5, 30}) {
     Eigen::MatrixXd x(n, 400);
     for (Eigen::Index i = 0; i < x.size(); ++i) x.data()[i] = normal(random);
-    if (n > 2) x.row(2) = x.row(0) + 1e-9 * x.row(1);  // all but dependent
+    if (n > 2) x.row(2) = x.row(0) + 1e-5 * x.row(2);  // all but dependent
     const Principal p = principal_of_gram(x * x.transpose(), 200);
     too_many += p.sigma.size() > n || !p.left.allFinite();
     const double first = p.sigma.size() ? p.sigma[0] : 0;
@@ -101,7 +101,7 @@ TEST(HardCases, Row26_EmptyAndDuplicateClusters) {
   std::normal_distribution<float> normal;
   double rise = 0, late = 0, bad = 0;
   for (const int different : {1, 3, 10}) {
-    for (const int clusters : {1, 5, 40}) {
+    for (const int clusters : {1, 3, 40}) {
       Sketch points;
       points.dims = 64;
       std::vector<float> some(static_cast<std::size_t>(64 * different));
@@ -110,7 +110,7 @@ TEST(HardCases, Row26_EmptyAndDuplicateClusters) {
         points.value.insert(points.value.end(), some.begin(), some.end());
       points.value.resize(points.value.size() + 64 * 3, 0.0f);  // and some at the origin
       const Clustering found =
-          cluster_points(points, {.clusters = clusters, .basis = 2, .iterations = 12}, {});
+          cluster_points(points, {.clusters = clusters, .basis = 1, .iterations = 12}, {});
       const std::set<std::uint32_t> used(found.cluster.begin(), found.cluster.end());
       bad += static_cast<int>(used.size()) != found.clusters ||
              found.cluster.size() != points.count() || found.clusters < 1;
@@ -166,6 +166,8 @@ TEST(HardCases, Row27_ZeroTransport) {
   const CompressReport nothing =
       compress_transport(build_transport(small.info, small.tiles, small.thresholds),
                          folder / "b.hlt", {.clusters = 6, .basis = 4});
+  for (const double e : nothing.of_lightings) bad += !std::isfinite(e);
+  at_most("errors that are not finite where all is zero", bad, 0);
   at_most("error where all is zero", nothing.measured_error, 0);
 }
 

@@ -337,6 +337,32 @@ TEST(HardCases, Row34_RaysAtVertices) {
       }
     }
   }
+  // The same seen from where nothing is a round number: walls of any distance, a place off the
+  // middle of the scene.
+  for (const int cells : {16, 32, 64}) {
+    for (int shape = 0; shape < 4; ++shape) {
+      Scene scene = gridded_room(cells);
+      const Vec3 middle{0.31 + shape, -0.27, 0.13 * shape};
+      for (Vec3& p : scene.position) {
+        const double far = 1 + 0.4 * std::sin(7.3 * p.x + 3 * shape) * std::cos(5.9 * p.y - p.z);
+        p = middle + far * p;
+      }
+      const Visibility visibility(scene);
+      for (const int samples : {1, 4, 16}) {
+        const DirectionTable table(16, samples);
+        const PointTracer tracer(visibility, table, false);
+        for (const Vec3& normal : {Vec3{0, 1, 0}, Vec3{1, 0, 0}, normalize(Vec3{1, 1, 1})}) {
+          ShadingPoint point;
+          const Vec3 at = visibility.to_local(middle);
+          point.origin = {static_cast<float>(at.x), static_cast<float>(at.y),
+                          static_cast<float>(at.z)};
+          point.geometric_normal = point.normal = normal;
+          most = std::max(most, irradiance(tracer, point));
+          texels += static_cast<double>(table.texels()) / 2;
+        }
+      }
+    }
+  }
   at_least("texels looked at", texels, 4e4);
   at_most("share of an even sky that gets in", most, 2e-5);
   // And the vertices of the room themselves, each on its own border.

@@ -368,8 +368,10 @@ TEST(HardCases, Row10_AllBlack) {
 }
 
 TEST(HardCases, Row12_SingleTexel) {
-  property("one texel has 3 log2 R + 1 coefficients; a budget of that many shows it exactly");
-  double wrong = 0, of_bound = 0, missed = 0;
+  property(
+      "one texel has 3 log2 R + 1 coefficients; a budget of that many shows it exactly, of fewer "
+      "that many");
+  double wrong = 0, of_bound = 0, missed = 0, not_of_budget = 0;
   std::mt19937_64 random(16);
   for (const int n : {8, 16, 64, 256}) {
     const HaarLayout layout(n);
@@ -396,8 +398,16 @@ TEST(HardCases, Row12_SingleTexel) {
       missed += !(chain.tracker.shown()[i] == light[i]);
     of_bound = std::max(of_bound, chain.drift().of_bound);
   }
+  for (int budget = 1; budget <= 9; ++budget) {
+    Chain few(small, options_of(LightingMethod::nwa, budget));
+    few.advance(lighting_of(layout, [](std::size_t k) { return k == 77 ? Rgb{5, 6, 7} : Rgb{}; }));
+    int shown = 0;
+    for (const Rgb& c : few.tracker.shown()) shown += !(c == Rgb{});
+    not_of_budget += shown != budget;
+  }
   at_most("texels with another number", wrong, 0);
   at_most("coefficients not shown", missed, 0);
+  at_most("budgets not kept to", not_of_budget, 0);
   at_most("of bound A", of_bound, 1);
 }
 
