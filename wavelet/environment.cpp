@@ -101,7 +101,19 @@ Environment::Environment(Image picture, const EnvironmentOptions& options, const
   }
 }
 
-Rgb Environment::radiance(const Vec3& direction) const {
+Rgb Environment::radiance(const Vec3& along) const {
+  const double size = std::max({std::abs(along.x), std::abs(along.y), std::abs(along.z)});
+  if (!(size > 0) || !std::isfinite(along.x) || !std::isfinite(along.y) ||
+      !std::isfinite(along.z)) {
+    throw Error(ErrorKind::invalid_argument,
+                fmt::format("direction is ({}, {}, {}), expected finite numbers, not all 0",
+                            along.x, along.y, along.z));
+  }
+  // Squares of very long and very short ones are beyond what doubles hold.
+  const int power = size > 1e100 || size < 1e-100 ? -std::ilogb(size) : 0;
+  const Vec3 direction = power == 0 ? along
+                                    : Vec3{std::scalbn(along.x, power), std::scalbn(along.y, power),
+                                           std::scalbn(along.z, power)};
   const PicturePoint point = projection_point(projection_, direction);
   const double x = point.u * picture_.width, y = point.v * picture_.height;
 

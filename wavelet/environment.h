@@ -41,8 +41,9 @@ class Environment {
   const Image& picture() const { return picture_; }
   const EnvironmentReport& report() const { return report_; }
 
-  /// Radiance from one direction (any non-zero length), bilinear in the picture; for backgrounds.
-  Rgb radiance(const Vec3& direction) const;
+  /// Radiance from one direction (of any length), bilinear in the picture; for backgrounds. Throws
+  /// Error{invalid_argument} unless it is finite and not 0.
+  Rgb radiance(const Vec3& along) const;
 
  private:
   Image picture_;
@@ -76,7 +77,8 @@ class EnvironmentSampler {
 
   /// Mean radiance of each texel of the environment turned by `rotation`: light that came from
   /// direction d comes from rotation * d. `out` has n = face_size(), otherwise throws
-  /// Error{invalid_argument}. No heap use. The same bits on any number of threads. Uses scratch of
+  /// Error{invalid_argument}, and for a rotation whose rows are not of length 1. No heap use. The
+  /// same bits on any number of threads. Uses scratch of
   /// this object: not to be called from two threads at once.
   void project(const Rotation& rotation, Cubemap& out) const;
 

@@ -270,6 +270,13 @@ void EnvironmentSampler::project(const Rotation& rotation, Cubemap& out) const {
     throw Error(ErrorKind::invalid_argument,
                 fmt::format("cube map has faces of {}, expected {}", out.n, n_));
   }
+  for (const Vec3& row : rotation.row) {
+    if (!(std::abs(dot(row, row) - 1) < 1e-3)) {
+      throw Error(ErrorKind::invalid_argument,
+                  fmt::format("a row of the rotation is ({}, {}, {}), expected length 1", row.x,
+                              row.y, row.z));
+    }
+  }
   parallel_for(parts_, [&](int part) { add_part(rotation, part); });
 
   // All parts together, in a fixed order: into the first part's place. The mean radiance of what

@@ -132,6 +132,25 @@ TEST(Environment, LooksUpWhatIsThere) {
   }
 }
 
+TEST(Environment, AnyLengthIsADirectionAndWhatIsNoneIsRefused) {
+  Image picture(8, 4);
+  for (std::size_t i = 0; i < picture.pixels.size(); ++i) {
+    picture.pixels[i] = {static_cast<float>(i), 1, 2};
+  }
+  const Environment environment(picture);
+  const Vec3 direction{0.3, -0.2, 0.9};
+  const Rgb there = environment.radiance(direction);
+  for (const double size : {1e300, 1e-300, 0x1p-1060, 7.0}) {
+    const Rgb found = environment.radiance(size * direction);
+    EXPECT_NEAR(found.r, there.r, 1e-3) << size;  // 2^-1060 leaves 14 bits of a number
+  }
+  const double nan = std::nan("");
+  for (const Vec3& none : {Vec3{}, Vec3{nan, 1, 0}, Vec3{1, nan, 0}, Vec3{1, 0, nan},
+                           Vec3{HUGE_VAL, 0, 0}, Vec3{0, 1, -HUGE_VAL}}) {
+    EXPECT_THROW(environment.radiance(none), Error);
+  }
+}
+
 TEST(Environment, LookupWrapsAroundTheSeam) {
   Image image(4, 2);
   image.at(0, 1) = {8, 8, 8};  // just right of the left border, which is +Z

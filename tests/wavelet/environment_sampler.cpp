@@ -303,6 +303,18 @@ TEST(EnvironmentSampler, BlackIsBlack) {
       std::all_of(map.texels.begin(), map.texels.end(), [](const Rgb& t) { return t == Rgb(); }));
 }
 
+TEST(EnvironmentSampler, RefusesWhatIsNoRotation) {
+  const Environment environment(Image(8, 4));
+  const EnvironmentSampler sampler(environment, 4);
+  Cubemap map(4);
+  EXPECT_THROW(sampler.project(rotation_y(std::nan("")), map), Error);
+  EXPECT_THROW(sampler.project(rotation_y(HUGE_VAL), map), Error);
+  Rotation stretched;
+  stretched.row[1].y = 1.1;
+  EXPECT_THROW(sampler.project(stretched, map), Error);
+  EXPECT_NO_THROW(sampler.project(rotation_x(1e6), map));
+}
+
 TEST(EnvironmentSampler, RefusesWrongSizes) {
   const Environment environment(Image(32, 16));
   for (const int n : {-4, 0, 3, 48, 2048}) {
