@@ -190,7 +190,8 @@ void RelightCommand::run() const {
   };
   const RelighterFactory make = any_relighter(clusters);
   if (replayed) {
-    relight_recording(scene, environments, *replayed, sequence.against_reference, frame_done, make);
+    relight_recording(scene, environments, *replayed, sequence.against_reference, frame_done, make,
+                      sequence.judge_errors);
   } else {
     relight_sequence(scene, environments.front(), second, sequence, frame_done, make);
   }

@@ -148,16 +148,22 @@ const LightingUpdate& FrameRelighter::decide(std::span<const Rgb> target, FrameS
   return tracker_.advance(target);
 }
 
+// What vertices weigh in the picture from where the camera is.
+void FrameRelighter::know_view() {
+  if (transport().kind() != TransportKind::mesh || judged_from_ == relighter_->camera()) return;
+  // A relighter looks when it applies, whatever that changes.
+  relighter_->apply({});
+  relighter_->vertex_weights(vertex_weights_);
+  estimator().set_vertex_weights(vertex_weights_);
+  judged_from_ = relighter_->camera();
+}
+
 void FrameRelighter::judge(std::span<const Rgb> target) {
   metrics_.error_estimate.reset();
   metrics_.error_bound.reset();
   if (!(judge_ || budget_.kind == BudgetKind::error) || !can_judge()) return;
+  know_view();
   ErrorEstimator& errors = estimator();
-  if (transport().kind() == TransportKind::mesh && judged_from_ != relighter_->camera()) {
-    relighter_->vertex_weights(vertex_weights_);
-    errors.set_vertex_weights(vertex_weights_);
-    judged_from_ = relighter_->camera();
-  }
   const PictureErrorGuess guess =
       errors.judge(target, tracker_.shown(), picture_norm(relighter_->picture()));
   metrics_.error_estimate = guess.estimate;
@@ -191,6 +197,7 @@ const FrameMetrics& FrameRelighter::relight(std::span<const Rgb> target, FrameSt
   if (budget_.kind == BudgetKind::error) estimator();
   if (budget_.kind == BudgetKind::milliseconds && !time_) time_.emplace(column_costs(transport()));
   const Clock::time_point begin = Clock::now();
+  if (budget_.kind == BudgetKind::error) know_view();
   if (budget_.kind == BudgetKind::milliseconds) {
     reset_bytes_.resize(static_cast<std::size_t>(layout.band_count()));
     for (int b = 0; b < layout.band_count(); ++b) {

@@ -99,6 +99,7 @@ class FrameRelighter {
   void go_dark();
   const LightingUpdate& decide(std::span<const Rgb> target, FrameStart start);
   ErrorEstimator& estimator();
+  void know_view();
   void judge(std::span<const Rgb> target);
   void follow_flicker();
 

@@ -66,7 +66,8 @@ void relight_sequence(const Transport& transport, const Environment& from, const
 
 void relight_recording(const Transport& transport, std::span<const Environment> environments,
                        const MotionRecording& recording, bool against_reference,
-                       const FrameDone& frame_done, const RelighterFactory& make) {
+                       const FrameDone& frame_done, const RelighterFactory& make,
+                       bool judge_errors) {
   if (environments.size() < recording.environments.size() || recording.frames.empty()) {
     throw Error(
         ErrorKind::invalid_argument,
@@ -85,7 +86,7 @@ void relight_recording(const Transport& transport, std::span<const Environment> 
   const RecordedFrame& first = recording.frames.front();
   FrameRelighter relighter(transport, options_of(first), first.weight, make);
   relighter.compare_with_reference(against_reference);
-  relighter.judge_errors(true);
+  relighter.judge_errors(judge_errors);
   const int frames = static_cast<int>(recording.frames.size());
   for (int i = 0; i < frames; ++i) {
     const RecordedFrame& frame = recording.frames[static_cast<std::size_t>(i)];

@@ -60,6 +60,7 @@ void relight_sequence(const Transport& transport, const Environment& from, const
 /// not that many.
 void relight_recording(const Transport& transport, std::span<const Environment> environments,
                        const MotionRecording& recording, bool against_reference,
-                       const FrameDone& frame_done, const RelighterFactory& make = {});
+                       const FrameDone& frame_done, const RelighterFactory& make = {},
+                       bool judge_errors = true);
 
 }  // namespace haarlight

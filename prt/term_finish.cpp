@@ -31,7 +31,14 @@ void directions_of(const float (*position)[3], const float (*normal)[3], std::si
                    const float* eye, Directions& out) {
   for (std::size_t i = 0; i < count; ++i) {
     const float nx = normal[i][0], ny = normal[i][1], nz = normal[i][2];
-    float x = eye[0] - position[i][0], y = eye[1] - position[i][1], z = eye[2] - position[i][2];
+    // Quarters, so that no difference of finite numbers overflows; brought to the size of 1, so
+    // that no square does.
+    float x = 0.25f * eye[0] - 0.25f * position[i][0];
+    float y = 0.25f * eye[1] - 0.25f * position[i][1];
+    float z = 0.25f * eye[2] - 0.25f * position[i][2];
+    const float most = std::max(std::max(std::abs(x), std::abs(y)), std::abs(z));
+    const float unit = 1 / std::max(most, 1e-30f);
+    x *= unit, y *= unit, z *= unit;
     const float scale = 1 / std::sqrt(std::max(x * x + y * y + z * z, 1e-30f));
     x *= scale, y *= scale, z *= scale;
     const float cx = x - nx, cy = y - ny, cz = z - nz;
@@ -74,9 +81,12 @@ TermFinish::TermFinish(std::shared_ptr<const TransportMesh> mesh,
     }
   }
   for (const auto& n : mesh_->normal) {
-    const float size = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    normal_.push_back(size > 0 ? std::array<float, 3>{n[0] / size, n[1] / size, n[2] / size}
-                               : std::array<float, 3>{0, 0, 1});
+    const Vec3 wide{static_cast<double>(n[0]), static_cast<double>(n[1]),
+                    static_cast<double>(n[2])};
+    const double size = length(wide);
+    const Vec3 unit = size > 0 ? wide * (1 / size) : Vec3{0, 0, 1};
+    normal_.push_back(
+        {static_cast<float>(unit.x), static_cast<float>(unit.y), static_cast<float>(unit.z)});
   }
   factor_.resize(mesh_->position.size() * terms);
 }
@@ -119,8 +129,8 @@ void TermFinish::look_slice(std::size_t begin, std::size_t end, const float* eye
 
 void TermFinish::look(const Vec3& eye) {
   const Vec3 from_origin = eye - mesh_->origin;
-  const float local[3] = {static_cast<float>(from_origin.x), static_cast<float>(from_origin.y),
-                          static_cast<float>(from_origin.z)};
+  const auto within = [](double x) { return static_cast<float>(std::clamp(x, -3e38, 3e38)); };
+  const float local[3] = {within(from_origin.x), within(from_origin.y), within(from_origin.z)};
   const std::size_t vertices = normal_.size();
   parallel_for(static_cast<int>((vertices + kSlice - 1) / kSlice), [&](int slice) {
     const std::size_t begin = static_cast<std::size_t>(slice) * kSlice;

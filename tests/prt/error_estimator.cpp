@@ -254,6 +254,21 @@ TEST(ErrorBudget, TakesWhatTheErrorAsksForAndNoMore) {
   }
 }
 
+// Vertices weigh by what is seen of them, from where the camera is in the frame that is decided.
+TEST(ErrorBudget, KnowsTheViewItDecidesFor) {
+  const Transport transport = random_mesh();
+  const auto lights = wandering_light(12, 5);
+  FrameRelighter relighter(transport, {}, WaveletWeight::transport);
+  relighter.set_budget({BudgetKind::error, 0.1});
+  relighter.relight(lights[0], FrameStart::exact, 0);
+  const Vec3 eyes[] = {{0, 0, 3.2}, {3.2, 0, 0}, {0, -3.2, 0.1}, {-1.4, 0.2, 0}};
+  for (std::size_t f = 1; f < lights.size(); ++f) {
+    relighter.set_camera(look_at(eyes[f % 4], {}, 0.6, 24, 20));
+    const FrameMetrics& m = relighter.relight(lights[f], FrameStart::advance, static_cast<int>(f));
+    EXPECT_LE(*m.error_estimate, 0.1 * (1 + 1e-5)) << f;
+  }
+}
+
 TEST(ErrorBudget, RefusesWhatItCannotKeep) {
   const Transport transport = random_picture();
   FrameRelighter relighter(transport, {}, WaveletWeight::area);

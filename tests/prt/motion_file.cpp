@@ -99,6 +99,14 @@ TEST(MotionFile, ReplayGivesTheNumbersOfTheMotion) {
     recording.frames.push_back(recorded);
     return true;
   });
+  for (const bool judge : {false, true}) {
+    const auto estimated = [&](const SequenceFrame& frame) {
+      EXPECT_EQ(frame.metrics.error_estimate.has_value(), judge);
+      EXPECT_EQ(frame.metrics.error_bound.has_value(), judge);
+      return true;
+    };
+    relight_recording(transport, environments, recording, false, estimated, {}, judge);
+  }
   std::size_t frames = 0;
   relight_recording(transport, environments, parse_motion(motion_text(recording), "m"), true,
                     [&](const SequenceFrame& frame) {

@@ -115,6 +115,27 @@ TEST(TermFinish, AConstantTermLooksAlikeFromEverywhere) {
   }
 }
 
+// Any finite mesh and eye have finite directions, found at the size of 1.
+TEST(TermFinish, HugeAndTinyNumbersStayFinite) {
+  const SmallTransport small = transport_with_factors(300, 3, 12);
+  const std::size_t vertices = small.info.mesh->position.size();
+  const std::vector<Rgb> sums(3 * vertices, Rgb{1, 1, 1});
+  std::vector<Rgb> radiance(vertices);
+  for (const float size : {1e-35f, 1e25f, 3e38f}) {
+    TransportMesh mesh = *small.info.mesh;
+    for (std::size_t v = 0; v < vertices; ++v) {
+      for (float& x : mesh.position[v]) x = v % 3 == 0 ? (x < 0 ? -size : size) : x;
+      for (float& n : mesh.normal[v]) n *= v % 2 == 0 ? size : 1 / size;
+    }
+    TermFinish finish(std::make_shared<const TransportMesh>(mesh), small.info.view);
+    for (const Vec3& eye : {Vec3{0, 9, 0}, Vec3{-1e300, 1e20, 3e38}, mesh.world(3)}) {
+      finish.look(eye);
+      finish.shade(sums, radiance);
+      for (std::size_t v = 0; v < vertices; ++v) ASSERT_TRUE(is_finite(radiance[v])) << v;
+    }
+  }
+}
+
 TEST(TermFinish, SameBitsOnAnyNumberOfThreads) {
   const SmallTransport small = transport_with_factors(4000, 4, 13);
   const Transport transport = build_transport(small.info, small.tiles, small.thresholds);

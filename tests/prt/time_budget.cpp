@@ -120,6 +120,34 @@ TEST(TimeBudget, AFrameWithoutWorkTeachesNothing) {
   EXPECT_NEAR(allowed(true), before, 0.05 * before);
 }
 
+// A band that is reset is taken back by streaming its columns again, which is budgeted for; where
+// all are, as with NWA or when PBI forgets all, sums start from zero and it costs nothing.
+TEST(TimeBudget, ResetsAreBudgetedForUnlessNothingStays) {
+  TimeBudget budget(std::vector<double>(100, 1e4));
+  budget.set_clock(made_up_now);
+  std::array<double, HaarLayout::kMaxBands> to_take_back{};
+  std::fill_n(to_take_back.begin(), 6, 2e5);
+  const auto taken = [&](const BandMask& reset) {
+    budget.start(4, g_now, to_take_back, 0);
+    budget.begin({}, {}, reset);
+    int count = 0;
+    while (count < 100000 && budget.take(count % 100, {})) ++count;
+    return count;
+  };
+  for (int i = 0; i < 50; ++i) {  // 10 MB a ms beside 0.5 ms
+    const int count = taken({});
+    budget.finish(0.5 + 1e-7 * 1e4 * count);
+  }
+  const int all = taken({});
+  EXPECT_GT(all, 1000);
+  BandMask some;
+  some[2] = some[5] = true;
+  EXPECT_EQ(taken(some), all - 40);  // two bands of 20 columns each
+  BandMask every;
+  for (std::size_t b = 0; b < 6; ++b) every[b] = true;
+  EXPECT_EQ(taken(every), all);
+}
+
 TEST(FrameTimeModel, FindsFixedAndPerByte) {
   FrameTimeModel model;
   std::mt19937_64 random(2);
