@@ -49,8 +49,7 @@ class LongRuns : public testing::Test {
 TEST_F(LongRuns, KilledAtAnyMomentItGoesOnToTheSameBytes) {
   const auto start = std::chrono::steady_clock::now();
   ASSERT_EQ(run(words("whole.hlt")).code, 0);
-  const double whole =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  double whole = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   std::mt19937 random(1);
   std::uniform_real_distribution<double> moment(0.2, 0.9);
   int kills = 0;
@@ -60,6 +59,8 @@ TEST_F(LongRuns, KilledAtAnyMomentItGoesOnToTheSameBytes) {
     if (program.running()) {
       program.kill();
       ++kills;
+    } else {
+      whole /= 2;  // the machine was busier before
     }
     program.wait();
     // Under the final name there is nothing, or all.

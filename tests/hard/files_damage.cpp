@@ -362,7 +362,8 @@ TEST_F(HardCases, Row45_FilesThatShrinkWhileInUse) {
     }
   });
   int whole = 0, refused = 0, wrong = 0;
-  for (int i = 0; i < 3000; ++i) {
+  // On a busy machine the cutter may be long in coming.
+  for (int i = 0; i < 3000 || (refused < 10 && i < 1'000'000); ++i) {
     try {
       ++(same(Transport::open(file), right) ? whole : wrong);
     } catch (const Error&) {

@@ -15,8 +15,12 @@
 #include <vector>
 
 #include "core/error.h"
+#include "cpca/cluster_relighter.h"
+#include "cpca/compress.h"
 #include "prt/image_relighter.h"
 #include "prt/mesh_relighter.h"
+#include "tests/core/temporary_folder.h"
+#include "tests/cpca/inputs.h"
 #include "tests/hard/hard_case.h"
 #include "tests/hard/oracle.h"
 #include "tests/hard/slow_tracker.h"
@@ -103,6 +107,61 @@ class Judge {
   std::vector<double> t_, peak_;
   std::size_t size_, first_, step_;
   double updates_ = 0;
+};
+
+// The same of clusters: U = W M light. Vectors' sums and vertices' each keep to bound A, the second
+// with a change of each of a cluster's vectors a frame, and what they add up is
+// sum |w| sum |M| |light|.
+class ClusterJudge {
+ public:
+  explicit ClusterJudge(const Transport& transport)
+      : info_(transport.info()), sizes_(transport.info()), m_(fixtures::dense_rows(transport)) {
+    auto sizes = std::make_shared<ClusterWeights>(*info_.clusters);
+    for (std::int16_t& w : sizes->weight) w = static_cast<std::int16_t>(std::abs(w));
+    for (float& scale : sizes->scale) scale = std::abs(scale);
+    sizes_.clusters = sizes;
+    m_sizes_ = m_;
+    for (double& x : m_sizes_) x = std::abs(x);
+    for (std::size_t c = 0; c < static_cast<std::size_t>(sizes->clusters()); ++c) {
+      most_vectors_ = std::max(most_vectors_, static_cast<double>(sizes->vectors_of(c)));
+    }
+    peak_.assign(info_.clusters->vertex.size() * static_cast<std::size_t>(info_.terms), {});
+  }
+  void count(const ApplyStats& stats) { updates_ += stats.columns + 10 + 2 * most_vectors_; }
+  /// What is shown now.
+  void look(std::span<const Rgb> light) {
+    std::vector<Rgb> size(light.begin(), light.end());
+    for (Rgb& l : size) l = {std::abs(l.r), std::abs(l.g), std::abs(l.b)};
+    right_ = fixtures::combined(info_, fixtures::product(m_, light));
+    const auto all = fixtures::combined(sizes_, fixtures::product(m_sizes_, size));
+    for (std::size_t v = 0; v < all.size(); ++v) {
+      peak_[v] = {std::max(peak_[v].r, all[v].r), std::max(peak_[v].g, all[v].g),
+                  std::max(peak_[v].b, all[v].b)};
+    }
+    coefficients_ = static_cast<double>(light.size());
+  }
+  /// Largest error over its bound, with two roundings to float.
+  double of_bound(std::span<const Rgb> found) const {
+    double worst = 0;
+    const double steps = updates_ + 2 * coefficients_ + 2 * most_vectors_;
+    const auto hold = [&](float value, double right, double peak) {
+      const double error = std::abs(static_cast<double>(value) - right);
+      const double bound = steps * 0x1p-53 * peak + 2 * 0x1p-24 * std::abs(right) + 0x1p-125;
+      worst = std::max(worst, error <= bound ? error / bound : HUGE_VAL);
+    };
+    for (std::size_t v = 0; v < found.size(); ++v) {
+      hold(found[v].r, right_[v].r, peak_[v].r);
+      hold(found[v].g, right_[v].g, peak_[v].g);
+      hold(found[v].b, right_[v].b, peak_[v].b);
+    }
+    return worst;
+  }
+
+ private:
+  TransportInfo info_, sizes_;
+  std::vector<double> m_, m_sizes_;
+  std::vector<RgbD> right_, peak_;
+  double updates_ = 0, coefficients_ = 0, most_vectors_ = 0;
 };
 
 // One row in so many is looked at: 2 in the suite, 13 in the long version; no multiple of 3, so
@@ -246,8 +305,16 @@ TEST(HardCases, Row04_TrackersAndRelighters) {
       fixtures::small_mesh_transport(4, fixtures::bumpy_sphere(20, 3), 4);
   const Transport image_transport = build_transport(small.info, small.tiles, small.thresholds);
   const Transport mesh_transport = build_transport(mesh.info, mesh.tiles, mesh.thresholds);
+  const TemporaryFolder folder;
+  fixtures::SmallTransport shiny = fixtures::smooth_transport(4, 20, 2, true, -0.8);
+  shiny.info.view = std::make_shared<const ViewFactors>(
+      fixtures::random_view_factors(shiny.info.mesh->position.size(), 2, 5));
+  compress_transport(build_transport(shiny.info, shiny.tiles, shiny.thresholds), folder / "c.hlt",
+                     {.clusters = 4, .basis = 4});
+  const Transport cluster_transport = Transport::open(folder / "c.hlt");
   const HaarLayout layout(4);
-  double done = 0, sums_worst = 0, image_worst = 0, mesh_worst = 0;
+  double done = 0, sums_worst = 0, image_worst = 0, mesh_worst = 0, cluster_worst = 0, arrived = 0,
+         behind = 0;
   rc::detail::checkGTest([&] {
     const auto sequence = *operations(10);
     LightingTracker tracker(layout, {});
@@ -255,6 +322,11 @@ TEST(HardCases, Row04_TrackersAndRelighters) {
     RowSums sums(image_transport);
     ImageRelighter image(image_transport);
     MeshRelighter vertices(mesh_transport);
+    // One follows all vectors in every frame, the other two of them; that one is held to what is
+    // shown when it says that it has arrived.
+    ClusterRelighter clusters(cluster_transport, {.basis_terms = -1, .skip_unseen = false});
+    ClusterRelighter slower(cluster_transport, {.basis_terms = 2, .skip_unseen = false});
+    ClusterJudge cluster_judge(cluster_transport);
     const std::size_t round = static_cast<std::size_t>(done) / kSequence, step = row_step();
     Judge sums_judge(small, round, step), image_judge(small, round, step),
         mesh_judge(mesh, round, step);
@@ -264,6 +336,8 @@ TEST(HardCases, Row04_TrackersAndRelighters) {
       sums_judge.count(sums.apply(update));
       image_judge.count(image.apply(update).apply);
       mesh_judge.count(vertices.apply(update).apply);
+      cluster_judge.count(clusters.apply(update).apply);
+      slower.apply(update);
     };
     for (const Operation& operation : sequence) {
       std::mt19937 random(operation.seed);
@@ -293,6 +367,8 @@ TEST(HardCases, Row04_TrackersAndRelighters) {
           tracker.set_options(options);
           slow.set_options(options);
           sums.expect_resets(options.method == LightingMethod::pbi);
+          clusters.expect_resets(options.method == LightingMethod::pbi);
+          slower.set_exact(random() % 4 == 0);
           break;
         case 6:
           exact = true;
@@ -344,13 +420,21 @@ TEST(HardCases, Row04_TrackersAndRelighters) {
       const double c = mesh_judge.of_bound(doubles(vertices.radiance()), tracker.shown(), true);
       sums_worst = std::max(sums_worst, a), image_worst = std::max(image_worst, b);
       mesh_worst = std::max(mesh_worst, c);
-      RC_ASSERT(a <= 1 && b <= 1 && c <= 1);
+      cluster_judge.look(tracker.shown());
+      double d = cluster_judge.of_bound(clusters.sums());
+      ++(slower.settled() ? arrived : behind);
+      if (slower.settled()) d = std::max(d, cluster_judge.of_bound(slower.sums()));
+      cluster_worst = std::max(cluster_worst, d);
+      RC_ASSERT(a <= 1 && b <= 1 && c <= 1 && d <= 1);
     }
   });
   at_least("operations", done, 100.0 * kSequence);
   at_most("sums: of bound A", sums_worst, 1);
   at_most("pictures: of their bound", image_worst, 1);
   at_most("meshes: of their bound", mesh_worst, 1);
+  at_most("clusters: of their bound", cluster_worst, 1);
+  at_least("frames with all of two vectors at a time", arrived, 1000);
+  at_least("frames on the way there", behind, 1000);
 }
 
 }  // namespace

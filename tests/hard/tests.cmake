@@ -18,7 +18,7 @@ endfunction()
 
 find_package(rapidcheck REQUIRED)
 haarlight_hard_test(numbers SOURCES numbers_lighting numbers_basis numbers_floats USES haarlight_prt)
-haarlight_hard_test(properties SOURCES properties USES haarlight_prt rapidcheck)
+haarlight_hard_test(properties SOURCES properties USES haarlight_cpca rapidcheck)
 haarlight_hard_test(long SOURCES long_run USES haarlight_prt)
 haarlight_hard_test(geometry SOURCES geometry_lobes geometry_rays USES haarlight_precompute)
 haarlight_hard_test(determinism SOURCES determinism USES haarlight_precompute haarlight_cpca
@@ -51,3 +51,9 @@ find_package(Python3 REQUIRED COMPONENTS Interpreter)
 add_test(NAME HardCases.PlantedFaultsFitTheTree
   COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_LIST_DIR}/planted.py --apply-only)
 set_tests_properties(HardCases.PlantedFaultsFitTheTree PROPERTIES LABELS hard TIMEOUT 60)
+# After all rows' tests, whose reports it reads.
+add_test(NAME StabilityTable.StatesWhatTestsReport
+  COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_LIST_DIR}/stability_table.py --check
+    --reports ${HARD_CASES_FOLDER} --binaries ${CMAKE_RUNTIME_OUTPUT_DIRECTORY})
+set_tests_properties(StabilityTable.StatesWhatTestsReport PROPERTIES LABELS hard TIMEOUT 60
+  FIXTURES_REQUIRED hard_cases)

@@ -125,24 +125,31 @@ TEST(Worker, WaitsForTheDisplayButNotForEver) {
   r.worker.set(settings);
   ASSERT_TRUE(wait_for([&] { return r.worker.update(); }));
   int looked_at = 0;
-  Clock::time_point taken = Clock::now();
-  for (int i = 0; i < 20; ++i) {
+  Clock::time_point taken = Clock::now(), asked = taken;
+  for (int i = 0; i < 100 && (i < 20 || looked_at == 0); ++i) {
     const std::uint64_t before = r.worker.frame().number;
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    ASSERT_TRUE(wait_for([&] { return r.worker.update(); }));
-    const Clock::time_point now = Clock::now();
+    ASSERT_TRUE(wait_for([&] {
+      asked = Clock::now();
+      return r.worker.update();
+    }));
     // Where this thread was held up itself, the worker was right to go on.
-    if (now - taken < std::chrono::milliseconds(200)) {
+    if (Clock::now() - taken < std::chrono::milliseconds(200)) {
       EXPECT_EQ(r.worker.frame().number, before + 1);
       ++looked_at;
     }
-    taken = now;
+    taken = asked;
   }
   EXPECT_GT(looked_at, 0);
-  const std::uint64_t before = r.worker.frame().number;
-  std::this_thread::sleep_for(std::chrono::milliseconds(900));
-  ASSERT_TRUE(wait_for([&] { return r.worker.update(); }));
-  EXPECT_GT(r.worker.frame().number, before + 1);
+  // One look at a hidden display in 0.9 s finds later frames; on a busy machine the third, say.
+  bool went_on = false;
+  for (int look = 0; look < 10 && !went_on; ++look) {
+    const std::uint64_t before = r.worker.frame().number;
+    std::this_thread::sleep_for(std::chrono::milliseconds(900));
+    ASSERT_TRUE(wait_for([&] { return r.worker.update(); }));
+    went_on = r.worker.frame().number > before + 1;
+  }
+  EXPECT_TRUE(went_on);
 }
 
 // Frames that are counted are all handed over, at rest too, and their motion is in frames.
