@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Can the hard cases' tests fail? Plants one fault after the other and watches the row turn red.
 
-    planted.py [--tree build/planted] [--only REGEX] [--jobs 2] [--prefix CMD] [--cmake ARG] [--apply-only]
+    planted.py [--tree build/planted] [--only REGEX] [--jobs 2] [--prefix CMD] [--cmake ARG] [--resume]
+               [--apply-only]
 
 planted/NN_name.patch is a fault that row NN must catch; its first lines say what it is:
     Fault: sums in float
@@ -9,10 +10,14 @@ planted/NN_name.patch is a fault that row NN must catch; its first lines say wha
 The tree is copied, built and found green; then each fault is applied, the one binary that holds its
 row is built and run, and the fault is taken back. A fault that does not compile is an error, one
 that the row survives is "not caught". Prints a table; exit code 1 unless all are caught.
+What has been seen is kept in planted.json of the tree, with hashes of the sources and of the patches;
+--resume goes on from there with what is the same still.
 --apply-only asks just whether every patch fits the tree as it is (a test of the suite).
 """
 
 import argparse
+import hashlib
+import json
 import re
 import shlex
 import shutil
@@ -38,6 +43,7 @@ class Fault:
             sys.exit(f"{path}: wanted a line 'Fault: what is wrong'")
         red = re.search(r"^Red: (\S+)$", head, re.MULTILINE)
         self.what = said.group(1)
+        self.hash = hashlib.sha256(path.read_bytes()).hexdigest()
         self.red = red.group(1) if red else f"HardCases.Row{int(row.group(1)):02d}_*"
 
 
@@ -51,7 +57,7 @@ def copy_tree(tree):
     wanted = {name for name in listed if name and (ROOT / name).is_file()}
     for old in tree.rglob("*"):
         name = old.relative_to(tree).as_posix()
-        if old.is_file() and name not in wanted and not name.startswith("build/"):
+        if old.is_file() and name not in wanted and not name.startswith(("build/", "planted.json")):
             old.unlink()
     for name in wanted:
         source, target = ROOT / name, tree / name
@@ -65,6 +71,37 @@ def copy_tree(tree):
 def apply(fault, tree, *options):
     return run(["patch", "-p1", "--forward", "--no-backup-if-mismatch", "-r", "-", "-i",
                 str(fault.path), *options], cwd=tree)
+
+
+class Seen:
+    """Lines of the table so far, for one state of the sources; each with its patch's hash."""
+
+    def __init__(self, tree, resume):
+        self.path = tree / "planted.json"
+        digest = hashlib.sha256()
+        for path in sorted(p for p in tree.rglob("*") if p.is_file()):
+            name = path.relative_to(tree).as_posix()
+            if name != self.path.name and not name.startswith(("build/", "docs/", "tests/hard/planted")):
+                digest.update(name.encode() + b"\0" + path.read_bytes())
+        self.state = digest.hexdigest()
+        self.lines, self.green = {}, []
+        if resume and self.path.exists():
+            kept = json.loads(self.path.read_text())
+            if kept["state"] == self.state:
+                self.lines, self.green = kept["lines"], kept["green"]
+
+    def line(self, fault):
+        """(caught, line), or nothing."""
+        caught, line, patch = self.lines.get(fault.name, (False, "", ""))
+        return (caught, line) if patch == fault.hash else None
+
+    def add(self, fault, caught, line):
+        self.lines[fault.name] = (caught, line, fault.hash)
+        self.keep()
+
+    def keep(self):
+        self.path.write_text(json.dumps({"state": self.state, "green": self.green,
+                                         "lines": self.lines}))
 
 
 class Build:
@@ -103,10 +140,16 @@ class Build:
         return result.returncode == 0, why.strip()
 
 
-def plant_all(faults, tree, build):
+def plant_all(faults, tree, build, seen):
     print("| fault | what | caught | by |\n| --- | --- | --- | --- |", flush=True)
     missed = []
     for fault, binary in faults:
+        if known := seen.line(fault):
+            caught, line = known
+            print(line, flush=True)
+            if not caught:
+                missed.append(fault)
+            continue
         applied = apply(fault, tree)
         if applied.returncode != 0:
             sys.exit(f"{fault.path}: does not apply:\n{applied.stdout}")
@@ -120,10 +163,12 @@ def plant_all(faults, tree, build):
             missed.append(fault)
         caught = "no" if green else "yes"
         why = why.replace("|", "\\|")[:120]
-        print(f"| {fault.name} | {fault.what} | {caught} | {why} |", flush=True)
+        line = f"| {fault.name} | {fault.what} | {caught} | {why} |"
+        print(line, flush=True)
         back = apply(fault, tree, "--reverse")
         if back.returncode != 0:
             sys.exit(f"{fault.path}: cannot be taken back:\n{back.stdout}")
+        seen.add(fault, not green, line)
     return missed
 
 
@@ -134,6 +179,7 @@ def main():
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--prefix", default="", help="put before every build and run: 'nice -n 5'")
     parser.add_argument("--cmake", default="", help="further arguments of cmake")
+    parser.add_argument("--resume", action="store_true")
     parser.add_argument("--apply-only", action="store_true")
     options = parser.parse_args()
     faults = [Fault(path) for path in sorted(PATCHES.glob("*.patch"))]
@@ -150,6 +196,7 @@ def main():
     tree = options.tree.resolve()
     tree.mkdir(parents=True, exist_ok=True)
     copy_tree(tree)
+    seen = Seen(tree, options.resume)
     build = Build(tree, options.jobs, shlex.split(options.prefix), shlex.split(options.cmake))
     build.make(*build.binaries, must=True)
     placed = []
@@ -159,11 +206,15 @@ def main():
             sys.exit(f"{fault.path}: no test is called {fault.red}")
         placed.append((fault, binary))
     for binary, red in sorted({(b, f.red) for f, b in placed}):
+        if red in seen.green:
+            continue
         green, why = build.passes(binary, red)
         if not green:
             sys.exit(f"{binary} {red}: fails without a fault: {why}")
+        seen.green.append(red)
+        seen.keep()
     placed.sort(key=lambda p: (p[1], p[0].name))
-    missed = plant_all(placed, tree, build)
+    missed = plant_all(placed, tree, build, seen)
     print(f"\n{len(placed) - len(missed)} of {len(placed)} faults caught")
     return 1 if missed else 0
 
