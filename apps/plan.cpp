@@ -66,7 +66,10 @@ void PlanCommand::run() {
   fmt::print("this plan: {}, {}, {} of the picture left out; everything: {}, {}\n",
              seconds_text(plan.seconds), bytes_text(plan.bytes), error_text(plan.error),
              seconds_text(plan.all_seconds), bytes_text(plan.all_bytes));
-  fmt::print("by {} rays of low resolution, and {} for the costs\n", plan.rays, plan.pilot_rays);
+  fmt::print(
+      "by {} rays of low resolution in {}, which --effects auto takes first; and {} for the "
+      "costs\n",
+      plan.rays, seconds_text(plan.look_seconds), plan.pilot_rays);
 }
 
 }  // namespace

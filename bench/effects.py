@@ -210,7 +210,7 @@ class Scene:
             "estimated error": auto_plan["error"], "measured error": error,
             "within": error <= coarse, "floor": math.hypot(auto["floor"], coarse_all["floor"]),
             "against fine": rms(self.of_lightings(auto, whole)),
-            "auto s": auto["seconds"], "estimated auto s": auto_plan["seconds"],
+            "auto s": auto["seconds"], "estimated auto s": auto_plan["seconds"] + auto_plan["look_seconds"],
             "all s": coarse_all["seconds"], "estimated all s": auto_plan["all_seconds"],
             "auto bytes": auto["bytes"], "estimated auto bytes": auto_plan["bytes"],
             "all bytes": coarse_all["bytes"], "estimated all bytes": auto_plan["all_bytes"]}

@@ -117,6 +117,7 @@ Effects less(const Effects& a, const Effects& b) {
 
 Plan make_plan(const Scene& scene, const SourceMaker& source, std::span<const std::uint32_t> order,
                const PlanOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
   Plan plan;
   const SceneFacts facts = scene_facts(scene);
   const SceneObjects objects = find_objects(scene);
@@ -329,6 +330,8 @@ Plan make_plan(const Scene& scene, const SourceMaker& source, std::span<const st
     if (row.effect == "caustics") row.needed = plan.effects.caustics;
   }
   if (probe) plan.rays = probe->rays();
+  plan.look_seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
   if (options.costs) {
     CostMeter meter(source, order, options);
@@ -361,6 +364,7 @@ std::string to_json(const Plan& plan, bool costs) {
   if (costs) {
     json["seconds"] = plan.seconds, json["bytes"] = plan.bytes;
     json["all_seconds"] = plan.all_seconds, json["all_bytes"] = plan.all_bytes;
+    json["look_seconds"] = plan.look_seconds;
     json["rays"] = plan.rays, json["pilot_rays"] = plan.pilot_rays;
   }
   return json.dump();

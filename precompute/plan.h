@@ -37,10 +37,11 @@ struct Plan {
   double error = 0;                  ///< of leaving out what `effects` leaves out, all together
   double seconds = 0, bytes = 0;     ///< a run with `effects` on this machine, now
   double all_seconds = 0, all_bytes = 0;  ///< a run with everything
-  std::vector<std::string> notes{};       ///< see precompute/scene_notes.h; by plan_image() and
-                                          ///< plan_mesh()
-  std::int64_t rays = 0;                  ///< that the look took, pilots of cost not counted
-  std::int64_t pilot_rays = 0;            ///< those
+  double look_seconds = 0;  ///< what the look took, without costs: --effects auto takes it first
+  std::vector<std::string> notes{};  ///< see precompute/scene_notes.h; by plan_image() and
+                                     ///< plan_mesh()
+  std::int64_t rays = 0;             ///< that the look took, pilots of cost not counted
+  std::int64_t pilot_rays = 0;       ///< those
 };
 
 struct PlanOptions {

@@ -72,6 +72,7 @@ class Program {
     if (!ended_) ended_ = ::wait4(process_, &status_, WNOHANG, &usage_) == process_;
     return !ended_;
   }
+  pid_t pid() const { return process_; }
   void interrupt() { ::kill(process_, SIGINT); }
   void kill() { ::kill(process_, SIGKILL); }
 

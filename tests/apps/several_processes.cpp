@@ -2,7 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "tests/apps/inputs.h"
@@ -18,6 +23,20 @@ const std::vector<std::string> kFour{HAARLIGHT_MPIEXEC, "--allow-run-as-root", "
 
 std::vector<std::string> words(const std::string& scene, const std::string& output) {
   return {"precompute", scene, "-o", output, "--size", "64x64", "--face", "16", "--threads", "2"};
+}
+
+// Those that a process has started and that have not ended.
+std::vector<pid_t> children_of(pid_t parent) {
+  std::vector<pid_t> children;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
+    std::ifstream in(entry.path() / "stat");
+    pid_t id = 0, of = 0;
+    std::string name;
+    char state = 0;
+    // "PID (NAME) STATE PARENT ...": the name of what is looked for has no space.
+    if (in >> id >> name >> state >> of && of == parent && state != 'Z') children.push_back(id);
+  }
+  return children;
 }
 
 TEST(SeveralProcesses, MakeTheBytesOfOne) {
@@ -40,6 +59,35 @@ TEST(SeveralProcesses, FailWithOneMessage) {
   EXPECT_NE(result.err.find("haarlight: absent.obj"), std::string::npos) << result.err;
   EXPECT_EQ(result.err.find("haarlight: "), result.err.rfind("haarlight: ")) << result.err;
   EXPECT_FALSE(std::filesystem::exists(folder / "a.hlt"));
+}
+
+// A process that is killed in the middle of the run takes the others along: mpirun ends, no file
+// claims to be complete, and what was done is taken up by the next run.
+TEST(SeveralProcesses, OneThatIsKilledEndsAllAndLosesNothing) {
+  const fixtures::TemporaryFolder folder;
+  fixtures::write_table_scene(folder / "table.obj");
+  std::vector<std::string> run = words("table.obj", "a.hlt");
+  run[5] = "192x192", run[7] = "32";
+  fixtures::Program four(run, folder.path(), kFour);
+  // Ranks are the children of mpirun: one of them is killed once there is a journal.
+  const auto partial = folder / "a.hlt.partial";
+  for (int i = 0; i < 3000 && !std::filesystem::exists(partial); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  ASSERT_TRUE(std::filesystem::exists(partial));
+  const std::vector<pid_t> ranks = children_of(four.pid());
+  ASSERT_EQ(ranks.size(), 4u);
+  ::kill(ranks[2], SIGKILL);
+  const ProgramResult result = four.wait();
+  EXPECT_NE(result.code, 0);
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.hlt"));
+  EXPECT_TRUE(std::filesystem::exists(partial));
+  run.push_back("--resume");
+  EXPECT_EQ(fixtures::run_program(run, folder.path()).code, 0);
+  run[3] = "b.hlt";
+  run.pop_back();
+  EXPECT_EQ(fixtures::run_program(run, folder.path()).code, 0);
+  EXPECT_EQ(fixtures::read_bytes(folder / "a.hlt"), fixtures::read_bytes(folder / "b.hlt"));
 }
 
 }  // namespace

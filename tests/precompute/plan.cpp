@@ -236,6 +236,7 @@ TEST(Plan, CostsAreOfTheOrderOfARun) {
   run.trace.effects = plan.effects;
   const auto report = precompute_image(scene, camera_for(96), run, folder.path() / "room.hlt");
   EXPECT_GT(plan.seconds, 0);
+  EXPECT_GT(plan.look_seconds, 0);
   const double chunks =
       static_cast<double>(Transport::open(folder.path() / "room.hlt").chunk_bytes());
   EXPECT_GT(plan.bytes, 0.5 * chunks);
