@@ -67,7 +67,7 @@ TEST(SeveralProcesses, OneThatIsKilledEndsAllAndLosesNothing) {
   const fixtures::TemporaryFolder folder;
   fixtures::write_table_scene(folder / "table.obj");
   std::vector<std::string> run = words("table.obj", "a.hlt");
-  run[5] = "192x192", run[7] = "32";
+  run[5] = "128x128", run[7] = "32";
   fixtures::Program four(run, folder.path(), kFour);
   // Ranks are the children of mpirun: one of them is killed once there is a journal.
   const auto partial = folder / "a.hlt.partial";
