@@ -1,4 +1,5 @@
 haarlight_test(viewer/session haarlight_viewer)
+haarlight_test(viewer/session_clusters haarlight_viewer)
 haarlight_test(viewer/worker haarlight_viewer)
 haarlight_test(viewer/lighting_picture haarlight_viewer)
 haarlight_test(viewer/preferences haarlight_viewer)
