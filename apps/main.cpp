@@ -73,6 +73,8 @@ int main(int argc, char** argv) {
       haarlight::add_compress);
   add("relight", "Relights a transport file under a moving environment; pictures and metrics",
       haarlight::add_relight);
+  add("animate", "Renders a scene that moves, frame by frame; pictures and metrics",
+      haarlight::add_animate);
   add("compare", "Says how far apart two pictures are", haarlight::add_compare);
   add("merge", "Joins the shards of one precomputation", haarlight::add_merge);
   add("info", "Checks a transport file and says what is in it", haarlight::add_info);

@@ -22,5 +22,6 @@ Verb add_relight(CLI::App& verb);
 Verb add_compare(CLI::App& verb);
 Verb add_info(CLI::App& verb);
 Verb add_merge(CLI::App& verb);
+Verb add_animate(CLI::App& verb);
 
 }  // namespace haarlight

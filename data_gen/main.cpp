@@ -16,6 +16,7 @@
 #include "core/error.h"
 #include "core/float_check.h"
 #include "core/image_io.h"
+#include "data_gen/animations.h"
 #include "data_gen/environments.h"
 #include "data_gen/merl.h"
 #include "data_gen/mesh_writer.h"
@@ -93,6 +94,10 @@ void list() {
   fmt::print("scenes (haarlight-data scene NAME -o FILE.glb):\n");
   for (const SceneEntry& entry : scenes())
     fmt::print("  {:<12} {}\n", entry.name, entry.description);
+  fmt::print("\nanimations (haarlight-data animation NAME -o FILE.glb):\n");
+  for (const AnimationEntry& entry : animations()) {
+    fmt::print("  {:<12} {}\n", entry.name, entry.description);
+  }
   fmt::print("\nenvironments (haarlight-data environment NAME -o FILE.exr):\n");
   for (const EnvironmentEntry& entry : environments()) {
     fmt::print("  {:<12} {}\n", entry.name, entry.description);
@@ -114,6 +119,12 @@ int run(int argc, char** argv) {
   scene->add_option("-o,--output", file, "FILE.glb or FILE.obj")->required();
   scene->add_option("--seed", seed, "Another seed gives another scene of the kind")
       ->capture_default_str();
+
+  CLI::App* animation = app.add_subcommand("animation", "Write a scene that moves as glTF");
+  animation->add_option("NAME", name, "Which animation")
+      ->required()
+      ->check(CLI::IsMember(names(animations())));
+  animation->add_option("-o,--output", file, "FILE.glb")->required();
 
   CLI::App* environment =
       app.add_subcommand("environment", "Write an environment as a picture of radiance");
@@ -140,7 +151,7 @@ int run(int argc, char** argv) {
       ->check(CLI::Range(1.0, 1e4))
       ->capture_default_str();
 
-  CLI::App* listing = app.add_subcommand("list", "List scenes and environments");
+  CLI::App* listing = app.add_subcommand("list", "List scenes, animations and environments");
 
   try {
     app.parse(argc, argv);
@@ -148,6 +159,10 @@ int run(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : 2;
   }
   if (*scene) write_scene(name, seed, file);
+  if (*animation) {
+    const std::size_t triangles = save_animation(file, name);
+    fmt::print("{}: {} triangles\n", file.string(), triangles);
+  }
   if (*environment) write_environment(name, seed, layout, size, file);
   if (*brdf) {
     Lacquer lacquer;

@@ -1,0 +1,137 @@
+// haarlight animate: a scene that moves, to pictures and metrics.
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <tuple>
+
+#include "apps/option_parsers.h"
+#include "apps/outputs.h"
+#include "apps/progress_printer.h"
+#include "apps/verbs.h"
+#include "caching/animated_scene.h"
+#include "caching/path_picture.h"
+#include "core/atomic_file.h"
+#include "core/image_io.h"
+#include "prt/tonemap.h"
+
+namespace haarlight {
+namespace {
+
+constexpr int kMaxFrames = 1'000'000;
+constexpr int kMaxSamples = 1 << 20;
+constexpr double kMaxRate = 1000, kMaxExposure = 64;
+
+struct AnimateCommand {
+  std::filesystem::path scene, folder, metrics;
+  std::string method = "path";
+  int frames = 0;  // 0: all of the animation
+  int first = 0;
+  double rate = 25;
+  PathPictureOptions picture{512, 512, 64, 1};
+  std::optional<double> exposure_ev;
+
+  void run() const;
+
+ private:
+  void save(int number, const Image& radiance, double exposure) const;
+};
+
+double seconds_since(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+void AnimateCommand::save(int number, const Image& radiance, double exposure) const {
+  const std::string stem = (folder / fmt::format("frame_{:04}", number)).string();
+  save_image(stem + ".exr", radiance);
+  save_image(stem + ".png", tonemap(radiance, {TonemapCurve::filmic, exposure}));
+}
+
+void AnimateCommand::run() const {
+  if (folder.empty() && metrics.empty()) {
+    throw CLI::ValidationError("-o", "'', expected a folder for pictures, or --metrics FILE.csv");
+  }
+  const AnimatedScene animation(scene, rate);
+  const int count = frames > 0 ? frames : std::max(animation.frames() - first, 1);
+  frame_camera(animation.at(first), picture.width, picture.height);  // refused before any work
+  if (!folder.empty()) require_writable_folder(folder);
+  std::optional<AtomicFile> table;
+  const auto write = [&](const std::string& line) { table->write(line.data(), line.size()); };
+  if (!metrics.empty()) {
+    table.emplace(metrics);
+    write("frame,method,triangles,build_ms,render_ms\n");
+  }
+
+  // The exposure is chosen once, so that frames can be compared.
+  ProgressPrinter progress("animate");
+  std::optional<double> exposure = exposure_ev;
+  for (int i = 0; i < count; ++i) {
+    const auto begin = std::chrono::steady_clock::now();
+    const AnimatedFrame frame = animation.at(first + i);
+    const FrameTracer tracer(frame);
+    const double built = seconds_since(begin);
+    const Image radiance =
+        path_picture(tracer, picture, [&](double share) { return progress((i + share) / count); });
+    const double rendered = seconds_since(begin) - built;
+    if (!exposure) exposure = auto_exposure_ev(radiance);
+    if (!folder.empty()) save(first + i, radiance, *exposure);
+    if (table) {
+      write(fmt::format("{},{},{},{:.4f},{:.4f}\n", first + i, method, animation.triangle_count(),
+                        1e3 * built, 1e3 * rendered));
+    }
+  }
+  if (table) table->commit();
+}
+
+}  // namespace
+
+Verb add_animate(CLI::App& verb) {
+  auto command = std::make_shared<AnimateCommand>();
+  AnimateCommand& c = *command;
+  add_path(verb, "SCENE", c.scene, "SCENE.gltf", "animated glTF scene, .gltf or .glb")->required();
+  add_choice<std::string>(verb, "--method", c.method, {{"path", "path"}},
+                          "path: path tracing, all bounces");
+  add_integer(verb, "--frames", c.frames, 0, kMaxFrames,
+              "how many; 0: to the end of the animation");
+  add_integer(verb, "--first", c.first, 0, kMaxFrames, "number of the first");
+  add_number(verb, "--fps", c.rate, 1e-3, kMaxRate, "frames a second of the animation");
+  add_integer(verb, "--spp", c.picture.samples, 1, kMaxSamples, "paths a pixel");
+  verb.add_option_function<std::string>(
+          "--size",
+          [&c](const std::string& text) {
+            std::tie(c.picture.width, c.picture.height) = parse_size("--size", text);
+          },
+          "of the pictures, pixels, each 1 to 8192 [512x512]")
+      ->type_name("WxH");
+  verb.add_option_function<std::string>(
+          "--exposure",
+          [&c](const std::string& text) {
+            c.exposure_ev.reset();
+            if (text == "auto") return;
+            c.exposure_ev = parse_number("--exposure", text, -kMaxExposure, kMaxExposure);
+          },
+          fmt::format("of the PNGs: stops, {} to {}, or auto: chosen once, from the first frame "
+                      "[auto]",
+                      -kMaxExposure, kMaxExposure))
+      ->type_name("auto|EV");
+  add_path(verb, "-o,--output", c.folder, "DIR",
+           "folder for frame_0000.exr, frame_0000.png, ...; made if missing");
+  add_path(verb, "--metrics", c.metrics, "FILE.csv",
+           "one row a frame: frame, method, triangles, build_ms (scene and ray tracer), render_ms");
+  add_threads(verb);
+  verb.footer(
+      "\nMoves: nodes, morph targets, cameras, lights (KHR_lights_punctual), and the numbers of\n"
+      "materials, lights and cameras by KHR_animation_pointer. Light: lamps, shining triangles\n"
+      "(emissiveFactor times KHR_materials_emissive_strength) and one radiance behind everything\n"
+      "(the scene's extras, \"haarlight\": {\"background\": [r, g, b]}).\n"
+      "\nExample:\n"
+      "  haarlight-data animation cube-in-box -o box.glb\n"
+      "  haarlight animate box.glb --frames 10 --size 256x192 --spp 32 -o out/box");
+  return [command] { command->run(); };
+}
+
+}  // namespace haarlight

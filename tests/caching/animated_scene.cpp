@@ -1,0 +1,215 @@
+// Scenes that move: keys, clips, morphs, cameras and lights read from glTF.
+
+#include "caching/animated_scene.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "caching/keyframes.h"
+#include "core/error.h"
+#include "data_gen/animations.h"
+
+namespace haarlight {
+namespace {
+
+using nlohmann::json;
+
+std::filesystem::path scratch(const std::string& name) {
+  const auto folder =
+      std::filesystem::temp_directory_path() / ("haarlight-animated-" + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  return folder / name;
+}
+
+// One triangle on a node that two clips move, a camera, a spot light and a morph target.
+struct SmallGltf {
+  json gltf;
+  std::string bytes;
+
+  std::size_t add(const std::vector<float>& values, const char* type, std::size_t width) {
+    const std::size_t begin = bytes.size();
+    bytes.resize(begin + values.size() * sizeof(float));
+    std::memcpy(bytes.data() + begin, values.data(), values.size() * sizeof(float));
+    gltf["bufferViews"].push_back(
+        {{"buffer", 0}, {"byteOffset", begin}, {"byteLength", values.size() * sizeof(float)}});
+    json accessor{{"bufferView", gltf["bufferViews"].size() - 1},
+                  {"componentType", 5126},
+                  {"count", values.size() / width},
+                  {"type", type}};
+    gltf["accessors"].push_back(accessor);
+    return gltf["accessors"].size() - 1;
+  }
+
+  SmallGltf() {
+    gltf["asset"]["version"] = "2.0";
+    const auto position = add({0, 0, 0, 1, 0, 0, 0, 1, 0}, "VEC3", 3);
+    const auto morph = add({0, 0, 2, 0, 0, 0, 0, 0, 0}, "VEC3", 3);
+    const auto time = add({0, 1}, "SCALAR", 1);
+    const auto move = add({0, 0, 0, 4, 0, 0}, "VEC3", 3);
+    const float half = std::sqrt(0.5f);
+    const auto turn = add({0, 0, 0, 1, 0, 0, half, half}, "VEC4", 4);
+    const auto weight = add({0, 1}, "SCALAR", 1);
+    const auto glow = add({0, 0, 0, 1, 1, 0.5f}, "VEC3", 3);
+    gltf["materials"] = json::array({{{"name", "paint"}}});
+    gltf["meshes"] = json::array(
+        {{{"primitives", json::array({{{"attributes", {{"POSITION", position}}},
+                                       {"material", 0},
+                                       {"targets", json::array({{{"POSITION", morph}}})}}})}}});
+    gltf["cameras"] =
+        json::array({{{"type", "perspective"}, {"perspective", {{"yfov", 0.8}, {"znear", 0.1}}}}});
+    gltf["extensions"]["KHR_lights_punctual"]["lights"] =
+        json::array({{{"type", "spot"}, {"intensity", 3}, {"color", {1, 0.5, 0.25}}}});
+    json lamp{{"translation", {0, 5, 0}}};
+    lamp["extensions"]["KHR_lights_punctual"]["light"] = 0;
+    gltf["nodes"] = json::array(
+        {{{"children", {1}}}, {{"mesh", 0}}, {{"camera", 0}, {"translation", {0, 0, 9}}}, lamp});
+    gltf["scenes"] = json::array({{{"nodes", {0, 2, 3}}}});
+    gltf["scene"] = 0;
+    const auto sampler = [&](std::size_t output) {
+      return json{{"input", time}, {"output", output}};
+    };
+    json pointed{{"path", "pointer"}};
+    pointed["extensions"]["KHR_animation_pointer"]["pointer"] = "/materials/0/emissiveFactor";
+    gltf["animations"] =
+        json::array({{{"samplers", {sampler(move), sampler(weight)}},
+                      {"channels",
+                       {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}},
+                        {{"sampler", 1}, {"target", {{"node", 1}, {"path", "weights"}}}}}}},
+                     {{"samplers", {sampler(turn), sampler(glow)}},
+                      {"channels",
+                       {{{"sampler", 0}, {"target", {{"node", 1}, {"path", "rotation"}}}},
+                        {{"sampler", 1}, {"target", pointed}}}}}});
+  }
+
+  std::filesystem::path write(const std::string& name) {
+    std::ofstream(scratch(name + ".bin"), std::ios::binary) << bytes;
+    gltf["buffers"] = json::array({{{"uri", name + ".bin"}, {"byteLength", bytes.size()}}});
+    const auto file = scratch(name + ".gltf");
+    std::ofstream(file) << gltf.dump();
+    return file;
+  }
+};
+
+void expect_near(const Vec3& found, const Vec3& wanted) {
+  // Keys are floats: 2^-24 of numbers up to 4, a few operations on them.
+  EXPECT_LT(length(found - wanted), 4e-6) << found.x << " " << found.y << " " << found.z;
+}
+
+TEST(AnimatedScene, NodesClipsMorphsLightsAndMaterialsMoveTogether) {
+  const AnimatedScene scene(SmallGltf().write("small"), 2);  // half a second a frame
+  EXPECT_EQ(scene.frames(), 3);
+  ASSERT_EQ(scene.triangle_count(), 1u);
+  EXPECT_EQ(scene.instance_of(0), 1u);
+
+  // Halfway: moved by 2, turned by 45 degrees about z, corner 0 lifted by half of 2.
+  const AnimatedFrame half = scene.at(1);
+  const double c = std::sqrt(0.5);
+  expect_near(half.scene.position[0], {2, 0, 1});
+  expect_near(half.scene.position[1], {2 + c, c, 0});
+  expect_near(half.scene.position[2], {2 - c, c, 0});
+  EXPECT_NEAR(half.emission[0].radiance.b, 0.25, 1e-7);
+  ASSERT_TRUE(half.scene.camera);
+  expect_near(half.scene.camera->position, {0, 0, 9});
+  ASSERT_EQ(half.light.size(), 1u);
+  expect_near(half.light[0].position, {0, 5, 0});
+  expect_near(half.light[0].direction, {0, 0, -1});
+  EXPECT_NEAR(half.light[0].intensity.g, 1.5, 1e-12);
+
+  // Before the first key and after the last their values hold, also a billion frames on.
+  const AnimatedFrame last = scene.at(2), late = scene.at(1'000'000'000);
+  expect_near(last.scene.position[1], {4, 1, 0});
+  EXPECT_EQ(last.scene.position, late.scene.position);
+}
+
+TEST(AnimatedScene, SpotsFadeBetweenTheirCones) {
+  SceneLight light;
+  light.kind = SceneLight::Kind::spot;
+  light.intensity = {8, 8, 8};
+  light.inner = 0.2, light.outer = 0.6;
+  const auto at = [&](double angle) {
+    return light_at(light, Vec3{std::sin(angle), 0, -std::cos(angle)} * 2.0).irradiance.r;
+  };
+  EXPECT_NEAR(at(0.1), 2, 1e-12);  // 8 / 2^2
+  EXPECT_EQ(at(0.7), 0);
+  EXPECT_GT(at(0.4), 0);
+  EXPECT_LT(at(0.4), 2);
+  EXPECT_EQ(light_at(light, light.position).irradiance, RgbD());  // no direction, no NaN
+}
+
+TEST(Keyframes, CubicSplinesThroughACubicAreThatCubic) {
+  // x(t) = t^3 - 2 t at t = 0, 2 and 3: a Hermite spline with its slopes is the cubic itself.
+  Keyframes keys;
+  keys.interpolation = Interpolation::cubic;
+  for (const double t : {0.0, 2.0, 3.0}) {
+    keys.time.push_back(t);
+    for (const double v : {3 * t * t - 2, t * t * t - 2 * t, 3 * t * t - 2})
+      keys.value.push_back(v);
+  }
+  std::array<double, 1> out{};
+  for (const double t : {0.0, 0.3, 1.1, 1.9, 2.0, 2.7, 3.0}) {
+    keys.at(t, out);
+    EXPECT_NEAR(out[0], t * t * t - 2 * t, 1e-12) << t;
+  }
+}
+
+TEST(Keyframes, RotationsTakeTheShorterArcAtAnEvenRate) {
+  Keyframes keys;
+  keys.width = 4, keys.rotation = true;
+  keys.time = {0, 1};
+  const double a = 1.2;  // radians about y; the second key has its sign turned
+  keys.value = {0, 0, 0, 1, 0, -std::sin(a / 2), 0, -std::cos(a / 2)};
+  std::array<double, 4> q{};
+  for (const double t : {0.0, 0.25, 0.5, 1.0}) {
+    keys.at(t, q);
+    EXPECT_NEAR(q[1], std::sin(t * a / 2), 1e-12);
+    EXPECT_NEAR(q[3], std::cos(t * a / 2), 1e-12);
+  }
+}
+
+TEST(AnimatedScene, WrongAnimationsAreRefusedByName) {
+  const auto refused = [](SmallGltf& file, const std::string& name) {
+    try {
+      const AnimatedScene scene(file.write(name));
+      return std::string();
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+  };
+  SmallGltf node, keys, pointer, reach;
+  node.gltf["animations"][0]["channels"][0]["target"]["node"] = 77;
+  EXPECT_NE(refused(node, "node"), "");
+  keys.gltf["animations"][0]["samplers"][0]["output"] = 1;  // three vectors for two keys
+  EXPECT_NE(refused(keys, "keys").find("expected 6 numbers"), std::string::npos);
+  pointer.gltf["animations"][1]["channels"][1]["target"]["extensions"]["KHR_animation_pointer"]
+              ["pointer"] = "/materials/0/name";
+  EXPECT_NE(refused(pointer, "pointer").find("/materials/0/name"), std::string::npos);
+  reach.gltf["accessors"][6]["count"] = 1'000'000'000'000;
+  EXPECT_NE(refused(reach, "reach"), "");
+}
+
+TEST(AnimatedScene, DataScenesAreReadAsTheyWereMade) {
+  for (const auto& entry : data_gen::animations()) {
+    const auto file = scratch(std::string(entry.name) + ".glb");
+    const std::size_t triangles = data_gen::save_animation(file, entry.name);
+    const AnimatedScene scene(file);
+    EXPECT_EQ(scene.triangle_count(), triangles) << entry.name;
+    EXPECT_EQ(scene.frames(), 401) << entry.name;
+    const AnimatedFrame a = scene.at(10), b = scene.at(11);
+    EXPECT_TRUE(a.scene.camera) << entry.name;
+    EXPECT_EQ(a.light.size(), 1u) << entry.name;
+    const bool moves =
+        a.scene.position != b.scene.position || a.light[0].position != b.light[0].position;
+    EXPECT_TRUE(moves) << entry.name;
+  }
+}
+
+}  // namespace
+}  // namespace haarlight

@@ -1,0 +1,2 @@
+haarlight_test(caching/animated_scene haarlight_caching haarlight_data_gen)
+haarlight_test(caching/path_picture haarlight_caching)
