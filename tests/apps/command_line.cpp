@@ -117,7 +117,7 @@ std::vector<std::string> precompute_with(std::vector<std::string> more) {
 TEST(CommandLine, WrongOnesAreRefusedByNameWithTheChoices) {
   const std::vector<WrongLine> lines{
       {{"frobnicate"},
-       {"'frobnicate'", "plan, precompute, compress, relight, compare, merge, info"}},
+       {"'frobnicate'", "plan, precompute, compress, relight, animate, compare, merge, info"}},
       {{"--frobnicate"}, {"--frobnicate"}},
       {relight_with({"--frobnicate"}), {"--frobnicate"}},
       {relight_with({"extra.hlt"}), {"extra.hlt"}},
