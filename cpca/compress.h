@@ -39,10 +39,10 @@ struct CompressReport {
   std::vector<double> inertia;       ///< see Clustering
 };
 
-/// Writes `file`, a transport of kind clusters, in bounded memory: the transport is streamed, twice
-/// in all. The same bytes on any number of threads. Throws Error{invalid_argument} for the
-/// transport of a picture or of clusters and for options out of range, Error{io}, Error{cancelled};
-/// then no file is left.
+/// Writes `file`, a transport of kind clusters, in bounded memory: the transport is streamed, once
+/// for a sketch and once for each time vectors are found (see CompressOptions::error). The same
+/// bytes on any number of threads. Throws Error{invalid_argument} for the transport of a picture or
+/// of clusters and for options out of range, Error{io}, Error{cancelled}; then no file is left.
 CompressReport compress_transport(const Transport& transport, const std::filesystem::path& file,
                                   const CompressOptions& options, const Progress& progress = {});
 
