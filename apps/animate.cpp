@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -14,6 +13,7 @@
 #include "apps/progress_printer.h"
 #include "apps/verbs.h"
 #include "caching/animated_scene.h"
+#include "caching/animation_method.h"
 #include "caching/path_picture.h"
 #include "core/atomic_file.h"
 #include "core/image_io.h"
@@ -32,23 +32,27 @@ struct AnimateCommand {
   int frames = 0;  // 0: all of the animation
   int first = 0;
   double rate = 25;
-  PathPictureOptions picture{512, 512, 64, 1};
+  PathPictureOptions picture{512, 512, 64, 1, false};
   std::optional<double> exposure_ev;
 
   void run() const;
 
  private:
-  void save(int number, const Image& radiance, double exposure) const;
+  std::unique_ptr<AnimationMethod> make(const AnimatedScene& animation) const;
+  void save(int number, const FramePicture& frame, double exposure) const;
 };
 
-double seconds_since(std::chrono::steady_clock::time_point begin) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+std::unique_ptr<AnimationMethod> AnimateCommand::make(const AnimatedScene& animation) const {
+  return std::make_unique<PathMethod>(animation, picture);
 }
 
-void AnimateCommand::save(int number, const Image& radiance, double exposure) const {
+void AnimateCommand::save(int number, const FramePicture& frame, double exposure) const {
   const std::string stem = (folder / fmt::format("frame_{:04}", number)).string();
-  save_image(stem + ".exr", radiance);
-  save_image(stem + ".png", tonemap(radiance, {TonemapCurve::filmic, exposure}));
+  save_image(stem + ".exr", frame.radiance);
+  save_image(stem + ".png", tonemap(frame.radiance, {TonemapCurve::filmic, exposure}));
+  for (const auto& [name, extra] : frame.extra) {
+    save_image((folder / fmt::format("{}_{:04}.png", name, number)).string(), extra);
+  }
 }
 
 void AnimateCommand::run() const {
@@ -59,29 +63,29 @@ void AnimateCommand::run() const {
   const int count = frames > 0 ? frames : std::max(animation.frames() - first, 1);
   frame_camera(animation.at(first), picture.width, picture.height);  // refused before any work
   if (!folder.empty()) require_writable_folder(folder);
+  const std::unique_ptr<AnimationMethod> drawing = make(animation);
   std::optional<AtomicFile> table;
   const auto write = [&](const std::string& line) { table->write(line.data(), line.size()); };
   if (!metrics.empty()) {
     table.emplace(metrics);
-    write("frame,method,triangles,build_ms,render_ms\n");
+    write(fmt::format("frame,method,triangles,{}\n", join_words(drawing->figures(), ",")));
   }
 
-  // The exposure is chosen once, so that frames can be compared.
   ProgressPrinter progress("animate");
+  const double before = drawing->prepare_share();
+  drawing->prepare(first, count, [&](double share) { return progress(before * share); });
+  // The exposure is chosen once, so that frames can be compared.
   std::optional<double> exposure = exposure_ev;
   for (int i = 0; i < count; ++i) {
-    const auto begin = std::chrono::steady_clock::now();
-    const AnimatedFrame frame = animation.at(first + i);
-    const FrameTracer tracer(frame);
-    const double built = seconds_since(begin);
-    const Image radiance =
-        path_picture(tracer, picture, [&](double share) { return progress((i + share) / count); });
-    const double rendered = seconds_since(begin) - built;
-    if (!exposure) exposure = auto_exposure_ev(radiance);
-    if (!folder.empty()) save(first + i, radiance, *exposure);
+    const FramePicture frame = drawing->frame(first + i, [&](double share) {
+      return progress(before + (1 - before) * (i + share) / count);
+    });
+    if (!exposure) exposure = auto_exposure_ev(frame.radiance);
+    if (!folder.empty()) save(first + i, frame, *exposure);
     if (table) {
-      write(fmt::format("{},{},{},{:.4f},{:.4f}\n", first + i, method, animation.triangle_count(),
-                        1e3 * built, 1e3 * rendered));
+      std::string line = fmt::format("{},{},{}", first + i, method, animation.triangle_count());
+      for (const double x : frame.figure) line += fmt::format(",{:.6g}", x);
+      write(line + "\n");
     }
   }
   if (table) table->commit();
@@ -99,7 +103,11 @@ Verb add_animate(CLI::App& verb) {
               "how many; 0: to the end of the animation");
   add_integer(verb, "--first", c.first, 0, kMaxFrames, "number of the first");
   add_number(verb, "--fps", c.rate, 1e-3, kMaxRate, "frames a second of the animation");
-  add_integer(verb, "--spp", c.picture.samples, 1, kMaxSamples, "paths a pixel");
+  add_integer(verb, "--spp", c.picture.samples, 1, kMaxSamples, "path: paths a pixel");
+  add_choice<bool>(
+      verb, "--filter", c.picture.centred, {{"box", false}, {"none", true}},
+      "path: box: paths are spread over the pixel; none: all go through its middle, as "
+      "those of other methods do");
   verb.add_option_function<std::string>(
           "--size",
           [&c](const std::string& text) {
@@ -121,7 +129,8 @@ Verb add_animate(CLI::App& verb) {
   add_path(verb, "-o,--output", c.folder, "DIR",
            "folder for frame_0000.exr, frame_0000.png, ...; made if missing");
   add_path(verb, "--metrics", c.metrics, "FILE.csv",
-           "one row a frame: frame, method, triangles, build_ms (scene and ray tracer), render_ms");
+           "one row a frame: frame, method, triangles, and what the method reports: path: build_ms "
+           "(scene and ray tracer), render_ms");
   add_threads(verb);
   verb.footer(
       "\nMoves: nodes, morph targets, cameras, lights (KHR_lights_punctual), and the numbers of\n"

@@ -3,6 +3,7 @@
 #include "caching/path_picture.h"
 
 #include <algorithm>
+#include <chrono>
 
 #include "core/error.h"
 #include "core/hash_bits.h"
@@ -37,7 +38,8 @@ Image path_picture(const FrameTracer& tracer, const PathPictureOptions& options,
         RgbD sum;
         for (int s = 0; s < options.samples; ++s) {
           PathRandom random(mix_bits(pixel, static_cast<std::uint64_t>(s)));
-          const double px = x + random.next(), py = y + random.next();
+          const double u = random.next(), v = random.next();
+          const double px = x + (options.centred ? 0.5 : u), py = y + (options.centred ? 0.5 : v);
           sum += tracer.radiance(eye, camera.direction(px, py), random);
         }
         picture.at(x, y) = Rgb(sum * (1.0 / options.samples));
@@ -49,6 +51,19 @@ Image path_picture(const FrameTracer& tracer, const PathPictureOptions& options,
     }
   }
   return picture;
+}
+
+FramePicture PathMethod::frame(int number, const Progress& progress) {
+  using Clock = std::chrono::steady_clock;
+  const auto ms = [](auto span) { return std::chrono::duration<double, std::milli>(span).count(); };
+  const auto begin = Clock::now();
+  const AnimatedFrame frame = scene_.at(number);
+  const FrameTracer tracer(frame);
+  const auto built = Clock::now();
+  FramePicture out;
+  out.radiance = path_picture(tracer, options_, progress);
+  out.figure = {ms(built - begin), ms(Clock::now() - built)};
+  return out;
 }
 
 }  // namespace haarlight
