@@ -8,6 +8,7 @@
 #include <string>
 #include <tuple>
 
+#include "apps/caching_options.h"
 #include "apps/option_parsers.h"
 #include "apps/outputs.h"
 #include "apps/progress_printer.h"
@@ -33,6 +34,7 @@ struct AnimateCommand {
   int first = 0;
   double rate = 25;
   PathPictureOptions picture{512, 512, 64, 1, false};
+  CachingOptions caching;
   std::optional<double> exposure_ev;
 
   void run() const;
@@ -43,7 +45,11 @@ struct AnimateCommand {
 };
 
 std::unique_ptr<AnimationMethod> AnimateCommand::make(const AnimatedScene& animation) const {
-  return std::make_unique<PathMethod>(animation, picture);
+  if (method == "path") return std::make_unique<PathMethod>(animation, picture);
+  CachingOptions options = caching;
+  options.width = picture.width, options.height = picture.height;
+  options.temporal = method == "trc";
+  return std::make_unique<CachingMethod>(animation, options);
 }
 
 void AnimateCommand::save(int number, const FramePicture& frame, double exposure) const {
@@ -97,8 +103,10 @@ Verb add_animate(CLI::App& verb) {
   auto command = std::make_shared<AnimateCommand>();
   AnimateCommand& c = *command;
   add_path(verb, "SCENE", c.scene, "SCENE.gltf", "animated glTF scene, .gltf or .glb")->required();
-  add_choice<std::string>(verb, "--method", c.method, {{"path", "path"}},
-                          "path: path tracing, all bounces");
+  add_choice<std::string>(verb, "--method", c.method,
+                          {{"path", "path"}, {"irc", "irc"}, {"trc", "trc"}},
+                          "path: path tracing, all bounces; irc: irradiance caching, anew every "
+                          "frame; trc: temporal radiance caching");
   add_integer(verb, "--frames", c.frames, 0, kMaxFrames,
               "how many; 0: to the end of the animation");
   add_integer(verb, "--first", c.first, 0, kMaxFrames, "number of the first");
@@ -108,6 +116,7 @@ Verb add_animate(CLI::App& verb) {
       verb, "--filter", c.picture.centred, {{"box", false}, {"none", true}},
       "path: box: paths are spread over the pixel; none: all go through its middle, as "
       "those of other methods do");
+  add_caching_options(verb, c.caching);
   verb.add_option_function<std::string>(
           "--size",
           [&c](const std::string& text) {
@@ -130,7 +139,9 @@ Verb add_animate(CLI::App& verb) {
            "folder for frame_0000.exr, frame_0000.png, ...; made if missing");
   add_path(verb, "--metrics", c.metrics, "FILE.csv",
            "one row a frame: frame, method, triangles, and what the method reports: path: build_ms "
-           "(scene and ray tracer), render_ms");
+           "(scene and ray tracer), render_ms; irc, trc: records_new, records_replaced, "
+           "records_alive, rays (of hemispheres), build_ms, update_ms (of records, by the clock), "
+           "hemisphere_ms and reproject_ms (parts of it, summed over threads), render_ms");
   add_threads(verb);
   verb.footer(
       "\nMoves: nodes, morph targets, cameras, lights (KHR_lights_punctual), and the numbers of\n"

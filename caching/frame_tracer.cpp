@@ -104,12 +104,14 @@ double FrameTracer::chance_to_hit(std::uint32_t triangle, const Vec3&, const Vec
   return chances_.of(i) / shining_[i].area * distance * distance / cosine;
 }
 
-RgbD FrameTracer::direct(const SurfaceHit& surface, const Bsdf& bsdf, PathRandom& random,
-                         bool mis) const {
+RgbD FrameTracer::direct(const SurfaceHit& surface, const Bsdf& bsdf, PathRandom& random, bool mis,
+                         LampShare* lamps) const {
   RgbD sum;
+  if (lamps) *lamps = {};
   if (bsdf.is_specular()) return sum;
   const Vec3 place = surface.position;
-  for (const SceneLight& light : frame_.light) {
+  for (std::size_t n = 0; n < frame_.light.size(); ++n) {
+    const SceneLight& light = frame_.light[n];
     // Lights stand in the world; distances fall off in metres.
     SceneLight local = light;
     local.position = visibility_.to_local(light.position);
@@ -122,9 +124,13 @@ RgbD FrameTracer::direct(const SurfaceHit& surface, const Bsdf& bsdf, PathRandom
     const RgbD f = reflected(bsdf, arrival.from);
     if (!(l1_norm(f) > 0)) continue;
     const Vec3 origin = off_surface(place, surface.geometric_normal, arrival.from);
-    if (visibility_.occluded(floats(origin), arrival.from, arrival.distance)) continue;
+    if (visibility_.occluded(floats(origin), arrival.from, arrival.distance)) {
+      if (lamps && n < 64) lamps->hidden |= std::uint64_t{1} << n;
+      continue;
+    }
     sum += f * arrival.irradiance;
   }
+  if (lamps) lamps->radiance = sum;
   if (shining_.empty()) return sum;
 
   // One place on the shining triangles.
@@ -152,14 +158,29 @@ RgbD FrameTracer::direct(const SurfaceHit& surface, const Bsdf& bsdf, PathRandom
   return sum;
 }
 
+RgbD FrameTracer::lobe_light(const SurfaceHit& surface, const Bsdf& bsdf, PathRandom& random,
+                             int samples) const {
+  RgbD sum;
+  for (int s = 0; s < samples; ++s) {
+    const double u = random.next(), v = random.next();
+    const auto sample = bsdf.sample_lobe(u, v);
+    if (!sample || !(dot(sample->direction, surface.geometric_normal) > 0)) continue;
+    const Bsdf::LobeValues lobe = bsdf.lobe_values(sample->direction);
+    const RgbD f = bsdf.gloss_first * lobe.first + bsdf.gloss_second * lobe.second;
+    const Vec3 from = off_surface(surface.position, surface.geometric_normal, sample->direction);
+    sum += f * radiance(from, sample->direction, random, false) * (1 / (sample->pdf * samples));
+  }
+  return sum;
+}
+
 RgbD FrameTracer::radiance(const Vec3& from, const Vec3& direction, PathRandom& random,
                            bool first_emission) const {
   return radiance(visibility_.first_hit(from, direction), from, direction, random, first_emission);
 }
 
 RgbD FrameTracer::radiance(const std::optional<Visibility::Hit>& first, const Vec3& begin,
-                           const Vec3& begin_direction, PathRandom& random,
-                           bool first_emission) const {
+                           const Vec3& begin_direction, PathRandom& random, bool first_emission,
+                           LampShare* lamps) const {
   constexpr int kRoulette = 3, kMostBounces = 256;
   RgbD sum, passed{1, 1, 1};
   Rgb extinction{};
@@ -179,7 +200,7 @@ RgbD FrameTracer::radiance(const std::optional<Visibility::Hit>& first, const Ve
       sum += passed * emission * (pdf > 0 ? power_heuristic(pdf, other) : 1);
     }
     const Bsdf bsdf = bsdf_at(frame_.scene, surface);
-    sum += passed * direct(surface, bsdf, random, true);
+    sum += passed * direct(surface, bsdf, random, true, bounce == 0 ? lamps : nullptr);
 
     // One way on.
     const PartChances part(bsdf);

@@ -28,20 +28,37 @@ class FrameTracer {
   /// What a surface sends to its viewer by itself: its emission, if its lit side is seen.
   RgbD emitted(const SurfaceHit& surface) const;
 
+  /// What lamps alone send by way of a surface to its viewer, without noise.
+  struct LampShare {
+    RgbD radiance;
+    std::uint64_t hidden = 0;  ///< bit i: lamp i is not seen; of the first 64
+  };
+
   /// An unbiased estimate of the light of lamps and shining triangles that a surface sends to its
   /// viewer after one reflection; shining triangles by one sample. Where `mis` is set, samples are
   /// weighted by the power heuristic, the rest being found by sampling the BSDF (Veach 1997,
   /// section 9.2). Lamps behind glass do not shine through it: shadow rays stop at it.
-  RgbD direct(const SurfaceHit& surface, const Bsdf& bsdf, PathRandom& random, bool mis) const;
+  /// `lamps`, if wanted, gets the lamps' part.
+  RgbD direct(const SurfaceHit& surface, const Bsdf& bsdf, PathRandom& random, bool mis,
+              LampShare* lamps = nullptr) const;
+
+  /// An unbiased estimate of what a surface sends to its viewer by way of its lobe, of light that
+  /// has been reflected before, and of the background.
+  RgbD lobe_light(const SurfaceHit& surface, const Bsdf& bsdf, PathRandom& random,
+                  int samples) const;
+
+  /// Whether any triangle shines.
+  bool has_shining() const { return !shining_.empty(); }
 
   /// An unbiased estimate of the radiance that comes from `direction` (unit) at `from`, all
   /// bounces. `first_emission`: whether what the first surface sends by itself counts. Russian
   /// roulette from the fourth bounce on; cut after 256 bounces.
   RgbD radiance(const Vec3& from, const Vec3& direction, PathRandom& random,
                 bool first_emission = true) const;
-  /// The same from a first hit that is known already.
+  /// The same from a first hit that is known already. `lamps`, if wanted, gets the part of lamps
+  /// that light the first surface.
   RgbD radiance(const std::optional<Visibility::Hit>& hit, const Vec3& from, const Vec3& direction,
-                PathRandom& random, bool first_emission) const;
+                PathRandom& random, bool first_emission, LampShare* lamps = nullptr) const;
 
   /// A place just off a surface, on the side that `direction` goes to.
   static Vec3 off_surface(const Vec3& position, const Vec3& geometric_normal,

@@ -1,0 +1,56 @@
+// Light over the hemisphere of a place, in strata, and the irradiance and gradients it makes.
+
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "caching/body_place.h"
+#include "caching/frame_tracer.h"
+#include "caching/irradiance_record.h"
+
+namespace haarlight {
+
+/// A hemisphere in rings x sectors strata of equal cosine-weighted solid angle, one direction each.
+/// Ring j lies between sin^2 theta = j / rings and (j + 1) / rings, sector k between
+/// phi = 2 pi k / sectors and the next; stratum (j, k) is number j * sectors + k.
+struct Hemisphere {
+  int rings = 0, sectors = 0;
+  std::vector<Vec3> direction;   ///< unit, in the place's tangents and normal
+  std::vector<RgbD> radiance;    ///< that arrives along them
+  std::vector<double> distance;  ///< metres to what is seen; infinite for the background
+
+  std::size_t number(int ring, int sector) const {
+    return static_cast<std::size_t>(ring) * static_cast<std::size_t>(sectors) +
+           static_cast<std::size_t>(sector);
+  }
+  /// The stratum that a direction of the upper half is in.
+  std::size_t stratum_of(const Vec3& d) const;
+};
+
+/// About `samples` strata, as wide as high; directions jittered by `key`. Light is still missing.
+Hemisphere stratified_hemisphere(int samples, std::uint64_t key);
+
+/// What one direction sees, for the frame after.
+struct SeenPlace {
+  static constexpr std::uint32_t kBackground = 0xffffffffu, kBelow = 0xfffffffeu;
+  BodyPlace place;                  ///< its triangle is kBackground or, below the horizon, kBelow
+  FrameTracer::LampShare by_lamps;  ///< of the radiance
+  RgbD rest;                        ///< of the radiance
+};
+
+/// Fills in the light that arrives at `at`, a place in the tracer's frame: what surfaces send after
+/// at least one reflection, all further bounces by paths, and the background. What surfaces shine
+/// by themselves is left out: that is direct light. Directions below the triangle see nothing, at
+/// no distance that counts. `seen`, if wanted, gets one entry a stratum.
+void gather_hemisphere(const FrameTracer& tracer, const PlaceFrame& at, std::uint64_t key,
+                       Hemisphere& hemisphere, std::vector<SeenPlace>* seen);
+
+/// Irradiance, its rotation gradient, and its translation gradient by how the strata's borders move
+/// (Ward and Heckbert 1992, equations for stratified hemispheres).
+RecordValue record_value(const Hemisphere& hemisphere);
+
+/// The harmonic mean of the distances; infinite if nothing is seen.
+double harmonic_mean_distance(const Hemisphere& hemisphere);
+
+}  // namespace haarlight

@@ -1,0 +1,312 @@
+// Records of irradiance: closed forms of values and gradients, weights, the octree, reprojection.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "caching/hemisphere.h"
+#include "caching/irradiance_cache.h"
+#include "caching/reprojection.h"
+#include "caching/temporal_weight.h"
+#include "core/hash_bits.h"
+#include "tests/precompute/shapes.h"
+
+namespace haarlight {
+namespace {
+
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+
+// A hemisphere lit by light(direction), at distance(direction).
+template <typename Light, typename Distance>
+Hemisphere lit(int samples, const Light& light, const Distance& distance) {
+  Hemisphere h = stratified_hemisphere(samples, 5);
+  for (std::size_t i = 0; i < h.direction.size(); ++i) {
+    const double x = light(h.direction[i]);
+    h.radiance[i] = {x, 2 * x, 3 * x};
+    h.distance[i] = distance(h.direction[i]);
+  }
+  return h;
+}
+double far_off(const Vec3&) { return kInfinite; }
+
+TEST(Hemisphere, DirectionsLieInTheirStrata) {
+  const Hemisphere h = stratified_hemisphere(300, 9);
+  EXPECT_NEAR(static_cast<double>(h.direction.size()), 300, 40);
+  for (std::size_t i = 0; i < h.direction.size(); ++i) {
+    EXPECT_EQ(h.stratum_of(h.direction[i]), i);
+    EXPECT_NEAR(length(h.direction[i]), 1, 1e-12);
+  }
+}
+
+TEST(Hemisphere, LinearLightHasItsIrradianceAndRotationGradient) {
+  // L = a + b . w: E(n) = pi a + 2 pi / 3 (b . n), so that (n_K x n) . grad changes E by
+  // 2 pi / 3 (b . n) for n about n_K: grad = 2 pi / 3 (n_K x b).
+  const double a = 2;
+  const Vec3 b{0.5, -0.3, 0.8};
+  const RecordValue v = record_value(lit(
+      20000, [&](const Vec3& w) { return a + dot(b, w); }, far_off));
+  // Strata of 1/80 by 1/250 of a turn: midpoint sums are wrong by their squares, jitter by less;
+  // rotation has tan(theta), infinite at the horizon: the outermost ring, 1/80 of the light,
+  // decides.
+  EXPECT_NEAR(v.irradiance.r, kPi * a + 2 * kPi / 3 * b.z, 2e-3);
+  EXPECT_NEAR(v.irradiance.b, 3 * v.irradiance.r, 1e-12);
+  EXPECT_NEAR(v.rotation_x.r, 2 * kPi / 3 * -b.y, 0.04);
+  EXPECT_NEAR(v.rotation_y.r, 2 * kPi / 3 * b.x, 0.04);
+  EXPECT_EQ(v.translation_x.r, 0);
+}
+
+TEST(Hemisphere, EdgeOverheadHasItsTranslationGradient) {
+  // A ceiling at height h, bright (1) where x > 0: E(x) = pi (1 + x / sqrt(x^2 + h^2)) / 2 at x
+  // from below the edge, whose slope at 0 is pi / (2 h). y has none.
+  for (const double h : {0.5, 2.0}) {
+    const RecordValue v = record_value(lit(
+        5000, [&](const Vec3& w) { return w.x > 0 ? 1.0 : 0.0; },
+        [&](const Vec3& w) { return h / w.z; }));
+    EXPECT_NEAR(v.irradiance.r, kPi / 2, 0.02);
+    // The edge lies along borders of strata: what is left is a sum over 40 rings, of distances
+    // jittered in them, of terms ~ sqrt at the zenith: 3 % of room.
+    EXPECT_NEAR(v.translation_x.r * h, kPi / 2, 0.03 * kPi / 2) << h;
+    EXPECT_NEAR(v.translation_y.r * h, 0, 0.03 * kPi / 2) << h;
+  }
+}
+
+TEST(Hemisphere, RingOverheadMovesAsItsCenterDoes) {
+  // A ceiling whose brightness is x^2 - 1 inside |p| < 1 would change as its derivative; here a
+  // bright disc of radius 1 at height h moved by c: E = disc's form factor. By symmetry the slope
+  // is 0 below its middle; off it, by e, it is the closed form's numerical derivative.
+  const double h = 1, e = 0.6;
+  // Irradiance from a disc parallel to the place, at lateral offset x (Nusselt; radius 1).
+  const auto form = [&](double x) {
+    const double s = 1 + h * h + x * x;
+    return kPi / 2 * (1 - (s - 2) / std::sqrt(s * s - 4 * x * x));
+  };
+  const RecordValue v = record_value(lit(
+      20000,
+      [&](const Vec3& w) {
+        const double x = w.x / w.z * h + e, y = w.y / w.z * h;
+        return x * x + y * y < 1 ? 1.0 : 0.0;
+      },
+      [&](const Vec3& w) { return h / w.z; }));
+  const double slope = (form(e + 1e-4) - form(e - 1e-4)) / 2e-4;
+  EXPECT_NEAR(v.irradiance.r, form(e), 0.02);
+  EXPECT_NEAR(v.translation_x.r, slope, 0.05 * std::abs(slope));
+}
+
+TEST(Hemisphere, ClosedBoxThatShinesIsAFurnace) {
+  // Walls of albedo a that send e: all light is e / (1 - a), that which has been reflected e less.
+  Scene scene = shapes::empty_scene();
+  shapes::add_box(scene, {-1, -1, -1}, {1, 1, 1});
+  scene.material[0].albedo = {0.5f, 0.5f, 0.5f};
+  AnimatedFrame frame;
+  frame.emission.resize(1);
+  frame.emission[0] = {{0.3, 0.3, 0.3}, true};
+  frame.scene = std::move(scene);
+  const FrameTracer tracer(frame);
+  double sum = 0, squares = 0;
+  constexpr int kRecords = 40;
+  for (int i = 0; i < kRecords; ++i) {
+    const auto key = static_cast<std::uint64_t>(i);
+    const BodyPlace place{static_cast<std::uint32_t>(i % 12), 0.3, 0.3, false};
+    Hemisphere h = stratified_hemisphere(200, key);
+    gather_hemisphere(tracer, place_in(frame.scene, place), key, h, nullptr);
+    const double e = record_value(h).irradiance.g;
+    sum += e, squares += e * e;
+  }
+  const double mean = sum / kRecords;
+  const double error = std::sqrt((squares / kRecords - mean * mean) / (kRecords - 1));
+  EXPECT_NEAR(mean, kPi * 0.3, 5 * error);  // a chance of 6e-7
+  EXPECT_LT(error, 0.02);
+}
+
+PlaceFrame flat_place(const Vec3& position) {
+  PlaceFrame at;
+  at.position = position;
+  at.normal = at.geometric_normal = {0, 0, 1};
+  at.tangent = {1, 0, 0}, at.bitangent = {0, 1, 0};
+  return at;
+}
+
+TEST(IrradianceRecord, ErrorIsWards) {
+  const PlaceFrame at = flat_place({1, 2, 3});
+  EXPECT_EQ(record_error(at, 0.5, at.position, at.normal), 0);
+  EXPECT_NEAR(record_error(at, 0.5, {1, 2.1, 3}, at.normal), 0.2, 1e-12);
+  const Vec3 turned{std::sin(0.3), 0, std::cos(0.3)};
+  EXPECT_NEAR(record_error(at, 0.5, at.position, turned), std::sqrt(1 - std::cos(0.3)), 1e-12);
+  // In front of the record, and behind it.
+  EXPECT_EQ(record_error(at, 0.5, {1, 2, 2.9}, at.normal), kInfinite);
+  EXPECT_NEAR(record_error(at, 0.5, {1, 2, 3.1}, at.normal), 0.2, 1e-12);
+  EXPECT_EQ(record_weight(0.2, 0.2), 0);
+  EXPECT_NEAR(record_weight(0.1, 0.2), 5, 1e-12);
+  EXPECT_TRUE(std::isfinite(record_weight(0, 0.2)));
+}
+
+TEST(IrradianceRecord, ExtrapolatesAlongItsGradients) {
+  const PlaceFrame at = flat_place({0, 0, 0});
+  RecordValue v;
+  v.irradiance = {1, 1, 1};
+  v.translation_x = {0.5, 0, 0}, v.translation_y = {0, -0.5, 0}, v.rotation_y = {0, 0, 0.7};
+  const Vec3 turned = normalize(Vec3{0.2, 0, 1});  // n_K x n = (0, sin, 0)
+  const RgbD e = extrapolated(at, v, {0.1, 0.2, 0}, turned);
+  EXPECT_NEAR(e.r, 1.05, 1e-12);
+  EXPECT_NEAR(e.g, 0.9, 1e-12);
+  EXPECT_NEAR(e.b, 1 + 0.7 * turned.x, 1e-12);
+}
+
+TEST(IrradianceCache, MeansWeighAsEquationOneAndNeighboursAreClamped) {
+  Scene scene = shapes::empty_scene();
+  shapes::add_quad(scene, {-1, -1, 0}, {2, 0, 0}, {0, 2, 0});
+  IrradianceCache cache(0.5);
+  cache.begin(0, scene);
+  CacheRecord r;
+  r.place = {0, 0.5, 0, true};  // the middle of the lower edge: (0, -1, 0)
+  r.radius = 1, r.value.irradiance = {1, 2, 3}, r.life = 3;
+  cache.add(r, 0.01);
+  EXPECT_TRUE(cache.covers({0.4, -1, 0}, {0, 0, 1}));
+  EXPECT_FALSE(cache.covers({0.6, -1, 0}, {0, 0, 1}));
+  EXPECT_FALSE(cache.covers({0, -1, 0}, {1, 0, 0}));
+  const auto alone = cache.at({0.3, -1, 0}, {0, 0, 1}, {0, 0, 1});
+  ASSERT_TRUE(alone);
+  EXPECT_NEAR(alone->irradiance.g, 2, 1e-12);
+  // A second one at (0.4, -1, 0), of radius 0.1: the first may not reach beyond 0.5.
+  r.place.b1 = 0.7, r.radius = 0.1, r.value.irradiance = {3, 3, 3};
+  cache.add(r, 0.01);
+  EXPECT_NEAR(cache.records()[0].radius, 0.5, 1e-12);
+  const Vec3 p{0.38, -1, 0};  // errors: first 0.76 (not at all), second 0.2
+  const auto near = cache.at(p, {0, 0, 1}, {0, 0, 1});
+  ASSERT_TRUE(near);
+  EXPECT_NEAR(near->irradiance.r, 3, 1e-12);
+  cache.note_use();
+  EXPECT_EQ(cache.records()[0].last_used, 0);
+  // By frame 3 their life is over.
+  cache.begin(2, scene);
+  EXPECT_EQ(cache.alive_count(), 2u);
+  cache.begin(3, scene);
+  EXPECT_EQ(cache.alive_count(), 0u);
+}
+
+TEST(RecordOctree, FindsEverySphereAboutAPlace) {
+  RecordOctree tree({0.5, 0.5, 0.5}, 0.5);
+  std::vector<Vec3> center;
+  std::vector<double> radius;
+  PathRandom random(3);
+  for (std::uint32_t i = 0; i < 400; ++i) {
+    // A few lie outside the root.
+    center.push_back({random.next() * 1.2 - 0.1, random.next(), random.next()});
+    radius.push_back(std::exp2(-8 * random.next()) * 0.5);
+    tree.insert(i, center[i], radius[i]);
+  }
+  for (int n = 0; n < 400; ++n) {
+    const Vec3 p{random.next() * 1.2 - 0.1, random.next(), random.next()};
+    std::set<std::uint32_t> found;
+    tree.visit(p, [&](std::uint32_t i) { EXPECT_TRUE(found.insert(i).second) << "twice"; });
+    for (std::uint32_t i = 0; i < 400; ++i) {
+      EXPECT_TRUE(length(p - center[i]) > radius[i] || found.count(i)) << i;
+    }
+    EXPECT_LT(found.size(), 300u);
+  }
+}
+
+TEST(TemporalWeight, LivesAsLongAsItsChangeAllows) {
+  // (tau - 1) (t - t0) <= a^t: 1 % a frame and 5 % allowed are ages 0 to 5; 1.0 / 0.99 is a little
+  // more than 1 %, so that 5 frames of it are beyond 5 %.
+  const TemporalAccuracy accuracy{0.05, 20};
+  EXPECT_EQ(lifespan(temporal_ratio(RgbD{1, 1, 1}, RgbD{1.00999, 1, 1}), accuracy), 6);
+  EXPECT_EQ(lifespan(temporal_ratio(RgbD{1, 1, 1}, RgbD{1, 0.99, 1}), accuracy), 5);
+  EXPECT_EQ(lifespan(temporal_ratio(RgbD{1, 1, 1}, RgbD{1, 1, 1}), accuracy), 20);
+  EXPECT_EQ(lifespan(temporal_ratio(RgbD{1, 1, 1}, RgbD{1, 1, 2}), accuracy), 1);
+  EXPECT_NEAR(temporal_ratio(RgbD{1, 1, 1}, RgbD{1, 1, 0.5}), 2, 1e-12);
+  EXPECT_NEAR(temporal_weight(1.25, 2), 2, 1e-12);
+}
+
+// A floor and a wall of next to no albedo under a lamp: what a place on the floor gets is the
+// lamp's light off the wall, in closed form at every direction.
+AnimatedFrame wall_frame(const Vec3& lamp, double wall_x) {
+  Scene scene = shapes::empty_scene();
+  shapes::add_quad(scene, {-3, 0, 3}, {6, 0, 0}, {0, 0, -6});
+  scene.material[0].albedo = {0.001f, 0.001f, 0.001f};
+  scene.material.push_back(scene.material[0]);
+  scene.material[1].albedo = {0.5f, 0.4f, 0.3f};
+  shapes::add_quad(scene, {wall_x, 0, -1}, {0, 0, 2}, {0, 2, 0}, 1);  // faces -x
+  AnimatedFrame frame;
+  frame.emission.resize(2);
+  frame.scene = std::move(scene);
+  SceneLight light;
+  light.position = lamp, light.intensity = {5, 5, 5};
+  frame.light.push_back(light);
+  return frame;
+}
+
+RgbD irradiance_in(const AnimatedFrame& frame, const BodyPlace& place, Hemisphere& h,
+                   std::vector<SeenPlace>* seen) {
+  const FrameTracer tracer(frame);
+  gather_hemisphere(tracer, place_in(frame.scene, place), 1, h, seen);
+  return record_value(h).irradiance;
+}
+
+TEST(Reprojection, IsTheSameBitsWhereNothingChanges) {
+  const AnimatedFrame frame = wall_frame({-1, 1.5, 0.2}, 1);
+  const FrameChange change(frame, frame);
+  const BodyPlace place{0, 0.2, 0.4, true};
+  Hemisphere h = stratified_hemisphere(400, 1);
+  std::vector<SeenPlace> seen;
+  irradiance_in(frame, place, h, &seen);
+  ReprojectionReport report;
+  const Hemisphere next = reprojected(h, seen, place, change, &report);
+  EXPECT_EQ(next.radiance, h.radiance);
+  EXPECT_EQ(next.distance, h.distance);
+  EXPECT_EQ(report.moved + report.covered + report.holes, 0);
+}
+
+TEST(Reprojection, MovedLampIsExactOnSurfacesThatSeeIt) {
+  const AnimatedFrame now = wall_frame({-1, 1.5, 0.2}, 1), next = wall_frame({-0.7, 1.2, 0}, 1);
+  const BodyPlace place{0, 0.2, 0.4, true};
+  Hemisphere h = stratified_hemisphere(400, 1), then = h;
+  std::vector<SeenPlace> seen;
+  irradiance_in(now, place, h, &seen);
+  const RgbD wanted = irradiance_in(next, place, then, nullptr);
+  const RgbD found = record_value(reprojected(h, seen, place, FrameChange(now, next))).irradiance;
+  // What is not looked at anew is light off the black floor and from there off the wall: 0.1 %.
+  EXPECT_NEAR(found.g, wanted.g, 2e-3 * wanted.g);
+  EXPECT_GT(std::abs(record_value(h).irradiance.g - wanted.g), 0.1 * wanted.g);
+}
+
+TEST(Reprojection, MovedWallIsSeenWhereItWillBe) {
+  // A step of a tenth of its distance: what is found has to be nearer to the truth than what is,
+  // by far, and within the noise of strata on the wall's outline.
+  const AnimatedFrame now = wall_frame({-1, 1.5, 0.2}, 1.0), next = wall_frame({-1, 1.5, 0.2}, 0.9);
+  const BodyPlace place{0, 0.2, 0.4, true};
+  Hemisphere h = stratified_hemisphere(4000, 1), then = h;
+  std::vector<SeenPlace> seen;
+  const double before = irradiance_in(now, place, h, &seen).g;
+  const double wanted = irradiance_in(next, place, then, nullptr).g;
+  ReprojectionReport report;
+  const double found =
+      record_value(reprojected(h, seen, place, FrameChange(now, next), &report)).irradiance.g;
+  EXPECT_GT(std::abs(before - wanted), 0.05 * wanted);
+  EXPECT_LT(std::abs(found - wanted), 0.25 * std::abs(before - wanted));
+  EXPECT_GT(report.moved, 0);
+}
+
+TEST(Reprojection, PlaceOnABodyThatTurnsWithAllElseSeesTheSame) {
+  // Everything turned by one rotation: directions of the place are as they were, and so is light.
+  AnimatedFrame now = wall_frame({-1, 1.5, 0.2}, 1), next = now;
+  const Rotation turn = rotation_y(0.7) * rotation_x(0.4);
+  for (Vec3& p : next.scene.position) p = turn * p;
+  for (Vec3& n : next.scene.normal) n = turn * n;
+  next.light[0].position = turn * next.light[0].position;
+  const BodyPlace place{0, 0.2, 0.4, true};
+  Hemisphere h = stratified_hemisphere(400, 1);
+  std::vector<SeenPlace> seen;
+  irradiance_in(now, place, h, &seen);
+  const RecordValue a = record_value(h);
+  const RecordValue b = record_value(reprojected(h, seen, place, FrameChange(now, next)));
+  // A direction on a border may fall into the next stratum by rounding: none of 400 does here.
+  EXPECT_NEAR(b.irradiance.g, a.irradiance.g, 1e-6 * a.irradiance.g);
+  EXPECT_NEAR(b.translation_x.g, a.translation_x.g, 1e-4 * a.irradiance.g);
+}
+
+}  // namespace
+}  // namespace haarlight
