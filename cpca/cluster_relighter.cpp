@@ -184,6 +184,16 @@ const Camera& ClusterRelighter::camera() const { return state_->camera; }
 const Image& ClusterRelighter::picture() const { return state_->picture; }
 std::span<const float> ClusterRelighter::coverage() const { return state_->drawing.coverage(); }
 const Transport& ClusterRelighter::transport() const { return state_->vectors.transport(); }
+void ClusterRelighter::vertex_weights(std::vector<float>& weights) const {
+  state_->drawing.vertex_weights(weights);
+}
+std::span<const Rgb> ClusterRelighter::view_factors() const {
+  return state_->finish ? state_->finish->factors() : std::span<const Rgb>();
+}
+void ClusterRelighter::pending_rows(std::vector<double>& rows) const {
+  rows.clear();
+  if (!settled()) state_->vertices.pending(state_->vectors, rows);
+}
 std::span<const Rgb> ClusterRelighter::sums() const { return state_->sums; }
 const CombineStats& ClusterRelighter::combine_stats() const { return state_->combined; }
 double ClusterRelighter::combine_ms() const { return state_->combine_ms; }

@@ -40,6 +40,10 @@ class ClusterRelighter final : public Relighter {
   const Image& picture() const override;
   std::span<const float> coverage() const override;
   const Transport& transport() const override;
+  bool shows_rows() const override { return true; }
+  void vertex_weights(std::vector<float>& weights) const override;
+  std::span<const Rgb> view_factors() const override;
+  void pending_rows(std::vector<double>& rows) const override;
 
   /// U, [vertex][term], coloured; of unseen clusters as they were last seen, with skip_unseen.
   std::span<const Rgb> sums() const;

@@ -175,4 +175,13 @@ CombineStats ClusterSums::follow(const RowSums& vectors,
   return sum;
 }
 
+void ClusterSums::pending(const RowSums& vectors, std::vector<double>& rows) const {
+  const double* totals = vectors.totals().data();
+  rows.resize(taken_.size());
+  for (std::size_t k = 0; k < taken_.size(); ++k) {
+    const std::size_t row = k / 3;
+    rows[k] = totals[row / kBlock * kBlockTotals + k % 3 * kBlock + row % kBlock] - taken_[k];
+  }
+}
+
 }  // namespace haarlight

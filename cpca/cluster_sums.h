@@ -45,6 +45,9 @@ class ClusterSums {
 
   /// Whether vertices of all seen clusters show W P exactly.
   bool settled() const { return settled_; }
+  /// P - Q: what vertices have yet to follow of the sums of `vectors`, [row][channel], over the
+  /// row's colour.
+  void pending(const RowSums& vectors, std::vector<double>& rows) const;
   const ClusterWeights& weights() const { return *weights_; }
 
  private:

@@ -76,7 +76,8 @@ ErrorEstimator::ErrorEstimator(const Transport& transport) {
 // A pixel's error is at most that of its vertices, each by its share of the picture. Weighted rows
 // hold root(area) x error; what is missing is the share over the area: on average over a group for
 // the estimate, at most for the bound.
-void ErrorEstimator::set_vertex_weights(std::span<const float> weights) {
+void ErrorEstimator::look(const PictureView& view) {
+  const std::span<const float> weights = view.vertex_weights;
   if (!mesh_) return;
   const ErrorTables& t = *tables_;
   std::vector<double>&share = target_sum_, &area = view_mean_;  // scratch; no heap

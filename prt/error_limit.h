@@ -2,7 +2,7 @@
 
 #pragma once
 
-#include "prt/error_estimator.h"
+#include "prt/error_judge.h"
 #include "prt/update_limit.h"
 
 namespace haarlight {
@@ -11,7 +11,7 @@ class ErrorLimit final : public UpdateLimit {
  public:
   /// Takes wavelets until estimator.estimate() is at most `error`; one at least where there is one,
   /// so that a light at rest arrives. The estimator must outlive it.
-  ErrorLimit(ErrorEstimator& estimator, double error) : estimator_(estimator), error_(error) {}
+  ErrorLimit(ErrorJudge& estimator, double error) : estimator_(estimator), error_(error) {}
 
   void begin(std::span<const Rgb> target, std::span<const Rgb> shown, const BandMask&) override {
     estimator_.begin(target, shown);
@@ -25,7 +25,7 @@ class ErrorLimit final : public UpdateLimit {
   }
 
  private:
-  ErrorEstimator& estimator_;
+  ErrorJudge& estimator_;
   double error_;
   bool any_ = false;
 };

@@ -90,8 +90,9 @@ void add_column(const std::uint64_t* rgb_blocks, const ColumnBlocks& blocks, std
   if (group != ~std::size_t{0}) done(group, part);
 }
 
-// The area of surface around each vertex, a third of each triangle, over the mean of all.
-std::vector<float> vertex_areas(const TransportMesh& mesh) {
+}  // namespace
+
+std::vector<float> relative_vertex_areas(const TransportMesh& mesh) {
   std::vector<double> area(mesh.position.size());
   for (const auto& corner : mesh.triangle) {
     const Vec3 a = mesh.world(corner[0]), b = mesh.world(corner[1]), c = mesh.world(corner[2]);
@@ -107,8 +108,6 @@ std::vector<float> vertex_areas(const TransportMesh& mesh) {
   return relative;
 }
 
-}  // namespace
-
 ErrorTables::ErrorTables(const Transport& transport) {
   const auto columns = static_cast<std::size_t>(transport.layout().size());
   const auto rows = static_cast<std::size_t>(transport.rows());
@@ -120,7 +119,7 @@ ErrorTables::ErrorTables(const Transport& transport) {
 
   // Areas, colours and signs of rows. Groups share out the blocks that have a meaning.
   std::vector<float> of_output;
-  if (mesh) of_output = vertex_areas(*transport.info().mesh);
+  if (mesh) of_output = relative_vertex_areas(*transport.info().mesh);
   const std::span<const std::uint32_t> output = transport.row_output();
   std::size_t last = rows;
   while (last > 1 && output[last - 1] == kNoOutput) --last;

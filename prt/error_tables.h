@@ -12,6 +12,10 @@
 
 namespace haarlight {
 
+/// The area of surface around each vertex, a third of each triangle, over the mean of all; 1 where
+/// nothing has an area.
+std::vector<float> relative_vertex_areas(const TransportMesh& mesh);
+
 /// Rows are weighted: a pixel by 1, a vertex by the root of the area of surface around it over the
 /// mean of all vertices; for norms the mean is added, lest small triangles count for nothing.
 /// Below, a weighted entry is weight * colour * T, a value a channel. Rows are in groups of blocks

@@ -110,9 +110,7 @@ void FrameRelighter::go_dark() {
   tracker_.set_options(options);
 }
 
-bool FrameRelighter::can_judge() const {
-  return relighter_->shows_rows() && ErrorEstimator::fits(transport());
-}
+bool FrameRelighter::can_judge() const { return relighter_->shows_rows(); }
 
 void FrameRelighter::set_budget(const FrameBudget& budget) {
   if (budget.kind != BudgetKind::wavelets && !(budget.value > 0 && std::isfinite(budget.value))) {
@@ -121,14 +119,13 @@ void FrameRelighter::set_budget(const FrameBudget& budget) {
   }
   if (budget.kind == BudgetKind::error && !can_judge()) {
     throw Error(ErrorKind::invalid_argument,
-                "an error as budget, expected a transport whose picture's error can be estimated: "
-                "of a picture, or of a mesh without view factors");
+                "an error as budget, expected a renderer whose picture's error can be estimated");
   }
   budget_ = budget;
 }
 
-ErrorEstimator& FrameRelighter::estimator() {
-  if (!errors_) errors_.emplace(transport());
+ErrorJudge& FrameRelighter::estimator() {
+  if (!errors_) errors_ = make_error_judge(transport());
   return *errors_;
 }
 
@@ -148,13 +145,11 @@ const LightingUpdate& FrameRelighter::decide(std::span<const Rgb> target, FrameS
   return tracker_.advance(target);
 }
 
-// What vertices weigh in the picture from where the camera is.
+// What vertices weigh in the picture from where the camera is, which the relighter has looked from.
 void FrameRelighter::know_view() {
-  if (transport().kind() != TransportKind::mesh || judged_from_ == relighter_->camera()) return;
-  // A relighter looks when it applies, whatever that changes.
-  relighter_->apply({});
+  if (transport().kind() == TransportKind::image || judged_from_ == relighter_->camera()) return;
   relighter_->vertex_weights(vertex_weights_);
-  estimator().set_vertex_weights(vertex_weights_);
+  estimator().look({vertex_weights_, relighter_->view_factors()});
   judged_from_ = relighter_->camera();
 }
 
@@ -163,7 +158,9 @@ void FrameRelighter::judge(std::span<const Rgb> target) {
   metrics_.error_bound.reset();
   if (!(judge_ || budget_.kind == BudgetKind::error) || !can_judge()) return;
   know_view();
-  ErrorEstimator& errors = estimator();
+  ErrorJudge& errors = estimator();
+  relighter_->pending_rows(pending_);
+  errors.set_pending(pending_);
   const PictureErrorGuess guess =
       errors.judge(target, tracker_.shown(), picture_norm(relighter_->picture()));
   metrics_.error_estimate = guess.estimate;
@@ -197,7 +194,12 @@ const FrameMetrics& FrameRelighter::relight(std::span<const Rgb> target, FrameSt
   if (budget_.kind == BudgetKind::error) estimator();
   if (budget_.kind == BudgetKind::milliseconds && !time_) time_.emplace(column_costs(transport()));
   const Clock::time_point begin = Clock::now();
-  if (budget_.kind == BudgetKind::error) know_view();
+  if (budget_.kind == BudgetKind::error && judged_from_ != relighter_->camera()) {
+    // A relighter looks when it applies, whatever that changes.
+    relighter_->set_exact(true);
+    relighter_->apply({});
+    know_view();
+  }
   if (budget_.kind == BudgetKind::milliseconds) {
     reset_bytes_.resize(static_cast<std::size_t>(layout.band_count()));
     for (int b = 0; b < layout.band_count(); ++b) {
@@ -207,7 +209,9 @@ const FrameMetrics& FrameRelighter::relight(std::span<const Rgb> target, FrameSt
   }
   const LightingUpdate& update = decide(target, start);
   const Clock::time_point decided = Clock::now();
-  relighter_->set_exact(start == FrameStart::exact || lighting.method == LightingMethod::reference);
+  relighter_->set_exact(start == FrameStart::exact ||
+                        lighting.method == LightingMethod::reference ||
+                        budget_.kind == BudgetKind::error);
   const RelightStats stats = relighter_->apply(update);
   const Clock::time_point end = Clock::now();
   update_ = &update;

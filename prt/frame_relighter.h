@@ -10,7 +10,7 @@
 #include <string>
 
 #include "core/image.h"
-#include "prt/error_estimator.h"
+#include "prt/error_judge.h"
 #include "prt/frame_budget.h"
 #include "prt/lighting_tracker.h"
 #include "prt/relighter.h"
@@ -42,7 +42,7 @@ struct FrameMetrics {
   /// Relative RMS of the picture's change since the frame before against that of the exact picture:
   /// || (P - P') - (R - R') || / || R ||. 0 in a first frame. Only with against_reference.
   std::optional<double> flicker;
-  /// What ErrorEstimator says of image_rel_rmse without a reference. Not for every transport.
+  /// What an ErrorJudge says of image_rel_rmse without a reference. Not for every renderer.
   std::optional<double> error_estimate, error_bound;
   /// What compressing the transport cost, as its file states: relative RMS of the picture under the
   /// worst of the lightings it was measured under. None where the file does not say.
@@ -71,10 +71,11 @@ class FrameRelighter {
   /// Whether frames say error_estimate and error_bound, where that can be. Not before it is asked
   /// for is the transport read for it. Its time is in no metric.
   void judge_errors(bool judge) { judge_ = judge; }
-  /// Whether there is an estimate for this transport.
+  /// Whether there is an estimate for this renderer.
   bool can_judge() const;
-  /// What ends updates from the next frame on. Throws Error{invalid_argument} for a value out of
-  /// range, or an error where none can be estimated.
+  /// What ends updates from the next frame on. Under an error a renderer that follows step by step
+  /// follows in full, since no wavelet makes good for what it has not followed. Throws
+  /// Error{invalid_argument} for a value out of range, or an error where none can be estimated.
   void set_budget(const FrameBudget& budget);
 
   /// Relights towards `target`, layout.size() coefficients, valid until the next call; the frame's
@@ -98,7 +99,7 @@ class FrameRelighter {
  private:
   void go_dark();
   const LightingUpdate& decide(std::span<const Rgb> target, FrameStart start);
-  ErrorEstimator& estimator();
+  ErrorJudge& estimator();
   void know_view();
   void judge(std::span<const Rgb> target);
   void follow_flicker();
@@ -114,11 +115,12 @@ class FrameRelighter {
   std::optional<Exact> exact_;
   bool compare_ = false;
   FrameBudget budget_;
-  std::optional<TimeBudget> time_;        // of the last frames; made when first asked for
-  std::optional<ErrorEstimator> errors_;  // likewise
+  std::optional<TimeBudget> time_;      // of the last frames; made when first asked for
+  std::unique_ptr<ErrorJudge> errors_;  // likewise
   bool judge_ = false;
   std::optional<Camera> judged_from_;  // the camera that errors_ knows
   std::vector<float> vertex_weights_;
+  std::vector<double> pending_;
   std::vector<double> reset_bytes_;
   std::optional<double> transport_error_;
   bool compared_before_ = false;

@@ -432,4 +432,22 @@ std::span<const MeshPicture::Fragment> MeshPicture::fragments(int x, int y) cons
       .subspan(band.first[pixel], band.first[pixel + 1] - band.first[pixel]);
 }
 
+void MeshPicture::vertex_weights(std::vector<float>& weights) const {
+  const State& s = *state_;
+  weights.assign(s.mesh_->position.size(), 0.0f);
+  for (int y = 0; y < s.height_; ++y) {
+    for (int x = 0; x < s.width_; ++x) {
+      const auto pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(s.width_) +
+                         static_cast<std::size_t>(x);
+      const float covered = s.coverage_[pixel];
+      for (const Fragment& f : fragments(x, y)) {
+        const auto& corner = s.mesh_->triangle[f.triangle];
+        weights[corner[0]] += covered * (f.share - f.second - f.third);
+        weights[corner[1]] += covered * f.second;
+        weights[corner[2]] += covered * f.third;
+      }
+    }
+  }
+}
+
 }  // namespace haarlight

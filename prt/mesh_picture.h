@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "core/camera.h"
 #include "core/image.h"
@@ -52,6 +53,9 @@ class MeshPicture {
   };
   /// The fragments of pixel (x, y), as of the last look(): at most one a triangle.
   std::span<const Fragment> fragments(int x, int y) const;
+  /// Of each vertex the sum over pixels of its weight in the pixel times the pixel's coverage, as
+  /// of the last look(): a picture's sum of squares is at most that of the vertices, so weighted.
+  void vertex_weights(std::vector<float>& weights) const;
 
  private:
   struct State;

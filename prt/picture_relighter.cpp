@@ -130,21 +130,11 @@ const Transport& PictureRelighter::transport() const {
 
 void PictureRelighter::vertex_weights(std::vector<float>& weights) const {
   weights.clear();
-  if (state_->image) return;
-  const TransportMesh& mesh = *state_->vertices->transport().info().mesh;
-  weights.resize(mesh.position.size());
-  const Camera& camera = state_->camera;
-  for (int y = 0; y < camera.height; ++y) {
-    for (int x = 0; x < camera.width; ++x) {
-      const float covered = state_->drawing->coverage()[state_->picture.index(x, y)];
-      for (const MeshPicture::Fragment& f : state_->drawing->fragments(x, y)) {
-        const auto& corner = mesh.triangle[f.triangle];
-        weights[corner[0]] += covered * (f.share - f.second - f.third);
-        weights[corner[1]] += covered * f.second;
-        weights[corner[2]] += covered * f.third;
-      }
-    }
-  }
+  if (state_->drawing) state_->drawing->vertex_weights(weights);
+}
+
+std::span<const Rgb> PictureRelighter::view_factors() const {
+  return state_->finish ? state_->finish->factors() : std::span<const Rgb>();
 }
 
 double PictureRelighter::reset_bytes(int band) const {

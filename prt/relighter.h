@@ -43,11 +43,13 @@ class Relighter {
   virtual std::span<const float> coverage() const = 0;
   virtual const Transport& transport() const = 0;
 
-  /// Whether a pixel is a row of T, or a mean of rows that are vertices, so that ErrorEstimator can
-  /// judge the picture. If so, of a mesh: the sum over the picture's pixels of each vertex's weight
-  /// times coverage, as last drawn.
+  /// Whether a pixel is a row of T, or a mean of vertices made of rows, so that an ErrorJudge can
+  /// judge the picture. If so, of a mesh: what it is made of (PictureView), as last drawn.
   virtual bool shows_rows() const { return false; }
   virtual void vertex_weights(std::vector<float>& weights) const { weights.clear(); }
+  virtual std::span<const Rgb> view_factors() const { return {}; }
+  /// What it has yet to follow: see ErrorJudge::set_pending.
+  virtual void pending_rows(std::vector<double>& rows) const { rows.clear(); }
   /// What the next apply() would move beside its columns, in bytes: to take back a band, and in any
   /// case. See RowSums::reset_bytes and fold_bytes.
   virtual double reset_bytes(int band) const { return static_cast<void>(band), 0.0; }
