@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "caching/lobe_harmonics.h"
 #include "core/parallel.h"
 
 namespace haarlight {
@@ -12,10 +13,6 @@ namespace {
 
 constexpr int kMostMirrors = 8;
 constexpr double kLeastWeight = 1e-3;
-
-bool is_wide(const Bsdf& bsdf) {
-  return bsdf.lobe == Bsdf::Lobe::ggx ? bsdf.width > 0.4 : bsdf.width < 3;
-}
 
 void follow(const FrameTracer& tracer, const Vec3& from, const Vec3& direction, const RgbD& weight,
             int mirrors, std::vector<GatherPoint>& points, RgbD& without) {
@@ -37,6 +34,8 @@ void follow(const FrameTracer& tracer, const Vec3& from, const Vec3& direction, 
     p.hit = *hit, p.direction = direction, p.weight = weight;
     p.position = at.position, p.normal = at.normal;
     p.broad = l1_norm(broad_reflectance(bsdf)) > 0;
+    p.glossy = lobe_kind(bsdf) == LobeKind::glossy;
+    if (p.glossy) p.lobe = lobe_table_key(bsdf);
     points.push_back(p);
   }
   if (mirrors == kMostMirrors) return;
@@ -63,14 +62,19 @@ void follow(const FrameTracer& tracer, const Vec3& from, const Vec3& direction, 
 
 }  // namespace
 
+LobeKind lobe_kind(const Bsdf& bsdf) {
+  if (!bsdf.has_lobe()) return LobeKind::none;
+  const bool phong = bsdf.lobe == Bsdf::Lobe::phong;
+  if (phong ? bsdf.width < 3 : bsdf.width > 0.4) return LobeKind::wide;
+  return (phong ? bsdf.width < 60 : bsdf.width > 0.15) ? LobeKind::glossy : LobeKind::narrow;
+}
+
 RgbD broad_reflectance(const Bsdf& bsdf) {
   RgbD sum;
   if (bsdf.has_diffuse()) sum += bsdf.diffuse_out(bsdf.to_viewer);
-  if (bsdf.has_lobe() && is_wide(bsdf)) sum += bsdf.lobe_albedo();
+  if (lobe_kind(bsdf) == LobeKind::wide) sum += bsdf.lobe_albedo();
   return sum;
 }
-
-bool has_narrow_lobe(const Bsdf& bsdf) { return bsdf.has_lobe() && !is_wide(bsdf); }
 
 GatherPoints gather_points(const FrameTracer& tracer, const Camera& camera) {
   GatherPoints out;

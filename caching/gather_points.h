@@ -19,7 +19,9 @@ struct GatherPoint {
   Vec3 direction;         ///< of the ray that found it, unit
   RgbD weight;            ///< share of its radiance that reaches the pixel
   Vec3 position, normal;  ///< world; without normal textures
-  bool broad = false;     ///< whether it asks for irradiance: is_broad()
+  bool broad = false;     ///< whether it asks for irradiance
+  bool glossy = false;    ///< whether it asks for incoming radiance
+  std::int32_t lobe = 0;  ///< lobe_table_key(), if so
 };
 
 /// The points of all pixels, a row of the picture at a time.
@@ -33,11 +35,14 @@ struct GatherPoints {
 /// thousandth of the light is left.
 GatherPoints gather_points(const FrameTracer& tracer, const Camera& camera);
 
-/// What of a surface is lit by irradiance: the share of it that leaves as radiance towards the
-/// viewer, times pi. Diffuse parts, and lobes so wide (GGX alpha above 0.4, Phong exponents below
-/// 3) that their albedo says enough.
+/// Who lights a lobe. Wide ones (GGX alpha above 0.4, Phong exponents below 3): irradiance, by
+/// their albedo. Glossy ones (alpha above 0.15, exponents below 60): incoming radiance in
+/// hemispherical harmonics, whose shortest wave they are wider than. Narrow ones: rays.
+enum class LobeKind { none, wide, glossy, narrow };
+LobeKind lobe_kind(const Bsdf& bsdf);
+
+/// What of a surface is lit by irradiance, diffuse parts and wide lobes: the share of it that
+/// leaves as radiance towards the viewer, times pi.
 RgbD broad_reflectance(const Bsdf& bsdf);
-/// Whether a surface has a lobe that is not.
-bool has_narrow_lobe(const Bsdf& bsdf);
 
 }  // namespace haarlight

@@ -15,21 +15,19 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 Vec3 in_plane(double phi) { return {std::cos(phi), std::sin(phi), 0}; }
 
-// Metres; what touches the place must not make gradients infinite.
-double nearer(double a, double b) { return std::max(std::min(a, b), 1e-9); }
-
 }  // namespace
 
 std::size_t Hemisphere::stratum_of(const Vec3& d) const {
-  const double sine2 = std::min(d.x * d.x + d.y * d.y, 1.0);
+  const double up = std::min(even ? 1 - std::max(d.z, 0.0) : d.x * d.x + d.y * d.y, 1.0);
   double turn = std::atan2(d.y, d.x) / (2 * kPi);
   if (turn < 0) turn += 1;
-  return number(std::min(static_cast<int>(sine2 * rings), rings - 1),
+  return number(std::min(static_cast<int>(up * rings), rings - 1),
                 std::min(static_cast<int>(turn * sectors), sectors - 1));
 }
 
-Hemisphere stratified_hemisphere(int samples, std::uint64_t key) {
+Hemisphere stratified_hemisphere(int samples, std::uint64_t key, bool even) {
   Hemisphere h;
+  h.even = even;
   // Strata about as wide as high: sectors = pi rings (Ward and Heckbert 1992).
   h.rings = std::max(static_cast<int>(std::lround(std::sqrt(samples / kPi))), 1);
   h.sectors = std::max(static_cast<int>(std::lround(kPi * h.rings)), 3);
@@ -38,7 +36,8 @@ Hemisphere stratified_hemisphere(int samples, std::uint64_t key) {
   for (int j = 0; j < h.rings; ++j) {
     for (int k = 0; k < h.sectors; ++k) {
       PathRandom random(mix_bits(key, h.number(j, k)));
-      const double sine2 = (j + random.next()) / h.rings;
+      const double up = (j + random.next()) / h.rings;
+      const double sine2 = even ? up * (2 - up) : up;
       const double phi = 2 * kPi * (k + random.next()) / h.sectors;
       const double sine = std::sqrt(sine2);
       h.direction[h.number(j, k)] = {sine * std::cos(phi), sine * std::sin(phi),
@@ -101,12 +100,12 @@ RecordValue record_value(const Hemisphere& h) {
       const double low = std::sqrt(low2), high = std::sqrt(high2);
       if (j > 0) {
         const std::size_t inner = h.number(j - 1, k);
-        const double near = nearer(h.distance[i], h.distance[inner]);
+        const double near = nearer_distance(h.distance[i], h.distance[inner]);
         add(out.translation_x, out.translation_y, middle,
             (light - h.radiance[inner]) * (2 * kPi / h.sectors * low * (1 - low2) / near));
       }
       const std::size_t side = h.number(j, before);
-      const double near = nearer(h.distance[i], h.distance[side]);
+      const double near = nearer_distance(h.distance[i], h.distance[side]);
       add(out.translation_x, out.translation_y, across,
           (light - h.radiance[side]) * ((high - low) / near));
     }

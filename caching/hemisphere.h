@@ -2,6 +2,7 @@
 
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -11,11 +12,13 @@
 
 namespace haarlight {
 
-/// A hemisphere in rings x sectors strata of equal cosine-weighted solid angle, one direction each.
-/// Ring j lies between sin^2 theta = j / rings and (j + 1) / rings, sector k between
-/// phi = 2 pi k / sectors and the next; stratum (j, k) is number j * sectors + k.
+/// A hemisphere in rings x sectors strata, one direction each, of equal cosine-weighted solid angle
+/// or, if even, of equal solid angle. Ring j lies between sin^2 theta (even: 1 - cos theta) of
+/// j / rings and (j + 1) / rings, sector k between phi = 2 pi k / sectors and the next; stratum
+/// (j, k) is number j * sectors + k.
 struct Hemisphere {
   int rings = 0, sectors = 0;
+  bool even = false;
   std::vector<Vec3> direction;   ///< unit, in the place's tangents and normal
   std::vector<RgbD> radiance;    ///< that arrives along them
   std::vector<double> distance;  ///< metres to what is seen; infinite for the background
@@ -29,7 +32,7 @@ struct Hemisphere {
 };
 
 /// About `samples` strata, as wide as high; directions jittered by `key`. Light is still missing.
-Hemisphere stratified_hemisphere(int samples, std::uint64_t key);
+Hemisphere stratified_hemisphere(int samples, std::uint64_t key, bool even = false);
 
 /// What one direction sees, for the frame after.
 struct SeenPlace {
@@ -47,10 +50,15 @@ void gather_hemisphere(const FrameTracer& tracer, const PlaceFrame& at, std::uin
                        Hemisphere& hemisphere, std::vector<SeenPlace>* seen);
 
 /// Irradiance, its rotation gradient, and its translation gradient by how the strata's borders move
-/// (Ward and Heckbert 1992, equations for stratified hemispheres).
+/// (Ward and Heckbert 1992, equations for stratified hemispheres). Requires strata that are not
+/// even.
 RecordValue record_value(const Hemisphere& hemisphere);
 
 /// The harmonic mean of the distances; infinite if nothing is seen.
 double harmonic_mean_distance(const Hemisphere& hemisphere);
+
+/// The nearer of two strata's distances, metres; what touches the place must not make gradients
+/// infinite.
+inline double nearer_distance(double a, double b) { return std::max(std::min(a, b), 1e-9); }
 
 }  // namespace haarlight

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "caching/record_cache.h"
+
 namespace haarlight {
 
 RecordValue& RecordValue::operator+=(const RecordValue& o) {
@@ -77,6 +79,19 @@ RecordValue limited(RecordValue value, double radius) {
     value.translation_y *= whole / used;
   }
   return value;
+}
+
+FoundIrradiance irradiance_at(const RecordCache<RecordValue>& cache, const Vec3& position,
+                              const Vec3& normal, const Vec3& shading) {
+  FoundIrradiance found;
+  double weights = 0;
+  found.left =
+      cache.visit(position, normal, [&](const PlaceFrame& at, const RecordValue& value, double w) {
+        found.irradiance += extrapolated(at, value, position, shading) * w;
+        weights += w;
+      });
+  if (weights > 0) found.irradiance *= 1 / weights;
+  return found;
 }
 
 }  // namespace haarlight

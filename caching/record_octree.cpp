@@ -10,6 +10,17 @@ namespace haarlight {
 RecordOctree::RecordOctree(const Vec3& center, double half_edge)
     : low_(center - Vec3{half_edge, half_edge, half_edge}), edge_(2 * half_edge), cell_(1) {}
 
+RecordOctree RecordOctree::around(const std::vector<Vec3>& points) {
+  Vec3 low = points.front(), high = low;
+  for (const Vec3& p : points) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+  const Vec3 size = high - low;
+  const double edge = std::max({size.x, size.y, size.z});
+  return {(low + high) * 0.5, edge > 0 ? edge / 2 : 1};
+}
+
 std::array<std::uint32_t, 3> RecordOctree::address(const Vec3& place) const {
   constexpr double kCells = 1 << kDeepest;
   const Vec3 at = (place - low_) * (kCells / edge_);

@@ -21,6 +21,9 @@ class RecordOctree {
   /// nearest cubes.
   RecordOctree(const Vec3& center, double half_edge);
 
+  /// The tightest one about points, of which there is at least one.
+  static RecordOctree around(const std::vector<Vec3>& points);
+
   /// Requires radius >= 0 and finite numbers.
   void insert(std::uint32_t number, const Vec3& position, double radius);
 

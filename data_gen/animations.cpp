@@ -109,7 +109,7 @@ void moving_light(AnimatedWriter& writer) {
 
 void spheres(AnimatedWriter& writer) {
   add_room(writer);
-  const auto wall = writer.add_material("polished", {0.9f, 0.85f, 0.8f}, 1, 0.3f);
+  const auto wall = writer.add_material("polished", {0.9f, 0.85f, 0.8f}, 1, 0.45f);
   writer.add_node({{"name", "polished wall"},
                    {"mesh", writer.add_mesh(quad({-0.9, 0.1, -0.98}, {0.9, 0.1, -0.98},
                                                  {0.9, 1.9, -0.98}, {-0.9, 1.9, -0.98}),
@@ -121,9 +121,9 @@ void spheres(AnimatedWriter& writer) {
                         kSegments);
   const Scene ball = finished(builder);
   const std::array materials{writer.add_material("clay", {0.6f, 0.3f, 0.2f}),
-                             writer.add_material("gold", {1.0f, 0.78f, 0.34f}, 1, 0.35f),
+                             writer.add_material("gold", {1.0f, 0.78f, 0.34f}, 1, 0.4f),
                              writer.add_material("moss", {0.2f, 0.45f, 0.15f}),
-                             writer.add_material("steel", {0.6f, 0.62f, 0.65f}, 1, 0.4f)};
+                             writer.add_material("steel", {0.6f, 0.62f, 0.65f}, 1, 0.45f)};
   Random random(1);
   for (int i = 0; i < kBalls; ++i) {
     const auto mesh = writer.add_mesh(ball, materials[static_cast<std::size_t>(i) % 4]);

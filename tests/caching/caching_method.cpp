@@ -104,14 +104,14 @@ TEST(CachingMethod, RecordsAreReplacedInPlaceOnlyWhereTheyAreSeen) {
   CachingMethod method(scene, o);
   constexpr int kFrames = 16;
   for (int f = 0; f < kFrames; ++f) method.frame(f * 1 + 50, {});
-  const auto& records = method.cache().records();
+  const auto& records = method.irradiance().records();
   int replaced = 0, dropped = 0;
-  for (const CacheRecord& r : records) {
+  for (const CacheRecord<RecordValue>& r : records) {
     const int end = r.born + r.life;
     EXPECT_LE(r.last_used, end - 1);
     if (end >= 50 + kFrames) continue;
     int successors = 0;
-    for (const CacheRecord& s : records) {
+    for (const CacheRecord<RecordValue>& s : records) {
       successors += s.born == end && s.key == r.key && s.place == r.place;
     }
     EXPECT_EQ(successors, r.last_used == end - 1 ? 1 : 0);
@@ -128,10 +128,10 @@ TEST(CachingMethod, InterpolatedRecordsMeetTheirSuccessors) {
   o.age = {0.5, 4};
   CachingMethod method(scene, o);
   method.prepare(10, 9, {});
-  const auto& records = method.cache().records();
+  const auto& records = method.irradiance().records();
   int met = 0;
-  for (const CacheRecord& r : records) {
-    for (const CacheRecord& s : records) {
+  for (const CacheRecord<RecordValue>& r : records) {
+    for (const CacheRecord<RecordValue>& s : records) {
       if (s.born != r.born + r.life || s.key != r.key || !(s.place == r.place)) continue;
       const RecordValue then = r.value + r.change * r.life;
       EXPECT_NEAR(then.irradiance.g, s.value.irradiance.g, 1e-9 + 1e-9 * s.value.irradiance.g);

@@ -8,7 +8,7 @@
 #include <set>
 
 #include "caching/hemisphere.h"
-#include "caching/irradiance_cache.h"
+#include "caching/record_cache.h"
 #include "caching/reprojection.h"
 #include "caching/temporal_weight.h"
 #include "core/hash_bits.h"
@@ -155,29 +155,28 @@ TEST(IrradianceRecord, ExtrapolatesAlongItsGradients) {
   EXPECT_NEAR(e.b, 1 + 0.7 * turned.x, 1e-12);
 }
 
-TEST(IrradianceCache, MeansWeighAsEquationOneAndNeighboursAreClamped) {
+TEST(RecordCache, MeansWeighAsEquationOneAndNeighboursAreClamped) {
   Scene scene = shapes::empty_scene();
   shapes::add_quad(scene, {-1, -1, 0}, {2, 0, 0}, {0, 2, 0});
-  IrradianceCache cache(0.5);
+  RecordCache<RecordValue> cache(0.5);
   cache.begin(0, scene);
-  CacheRecord r;
+  CacheRecord<RecordValue> r;
   r.place = {0, 0.5, 0, true};  // the middle of the lower edge: (0, -1, 0)
   r.radius = 1, r.value.irradiance = {1, 2, 3}, r.life = 3;
   cache.add(r, 0.01);
   EXPECT_TRUE(cache.covers({0.4, -1, 0}, {0, 0, 1}));
   EXPECT_FALSE(cache.covers({0.6, -1, 0}, {0, 0, 1}));
   EXPECT_FALSE(cache.covers({0, -1, 0}, {1, 0, 0}));
-  const auto alone = cache.at({0.3, -1, 0}, {0, 0, 1}, {0, 0, 1});
-  ASSERT_TRUE(alone);
-  EXPECT_NEAR(alone->irradiance.g, 2, 1e-12);
+  const auto alone = irradiance_at(cache, {0.3, -1, 0}, {0, 0, 1}, {0, 0, 1});
+  EXPECT_NEAR(alone.left, 3, 1e-12);
+  EXPECT_NEAR(alone.irradiance.g, 2, 1e-12);
   // A second one at (0.4, -1, 0), of radius 0.1: the first may not reach beyond 0.5.
   r.place.b1 = 0.7, r.radius = 0.1, r.value.irradiance = {3, 3, 3};
   cache.add(r, 0.01);
   EXPECT_NEAR(cache.records()[0].radius, 0.5, 1e-12);
   const Vec3 p{0.38, -1, 0};  // errors: first 0.76 (not at all), second 0.2
-  const auto near = cache.at(p, {0, 0, 1}, {0, 0, 1});
-  ASSERT_TRUE(near);
-  EXPECT_NEAR(near->irradiance.r, 3, 1e-12);
+  const auto near = irradiance_at(cache, p, {0, 0, 1}, {0, 0, 1});
+  EXPECT_NEAR(near.irradiance.r, 3, 1e-12);
   cache.note_use();
   EXPECT_EQ(cache.records()[0].last_used, 0);
   // By frame 3 their life is over.

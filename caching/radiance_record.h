@@ -1,0 +1,42 @@
+// Records of incoming radiance for glossy surfaces: Krivanek and others 2005.
+
+#pragma once
+
+#include <vector>
+
+#include "caching/hemisphere.h"
+#include "caching/hemispherical_harmonics.h"
+#include "caching/lobe_harmonics.h"
+
+namespace haarlight {
+
+/// Coefficients of incoming radiance in hemispherical harmonics about a PlaceFrame, and how they
+/// change a metre along its tangents: kHarmonics times RGB, one after the other. Linear in light;
+/// an empty one is zero.
+struct RadianceValue {
+  std::vector<float> coefficient, along_x, along_y;
+
+  RadianceValue& operator+=(const RadianceValue& o);
+  friend RadianceValue operator+(RadianceValue a, const RadianceValue& b) { return a += b; }
+  friend RadianceValue operator*(const RadianceValue& a, double s);
+  friend RadianceValue operator-(const RadianceValue& a, const RadianceValue& b) {
+    return a + b * -1;
+  }
+};
+
+/// By a hemisphere of even strata (Hemisphere::even). Gradients by how borders between strata move,
+/// as those of irradiance.
+RadianceValue radiance_value(const Hemisphere& hemisphere);
+
+/// As record_radius() of irradiance records, by the mean radiance; as limited(), likewise.
+double record_radius(const RadianceValue& value, double mean_distance, double least, double most);
+RadianceValue limited(RadianceValue value, double radius);
+
+/// What a lobe (unit shading normal, viewer in the world) sends to its viewer by a record at
+/// another place: the lobe is turned so that its mirror direction is right and its normal the
+/// record's; `table` is its lobe_table_key(). At least 0. Nothing if the mirror direction is below
+/// the record's horizon.
+RgbD lobe_radiance(const PlaceFrame& at, const RadianceValue& value, const Vec3& position,
+                   const Bsdf& bsdf, std::int32_t table, const LobeHarmonics& lobes);
+
+}  // namespace haarlight
