@@ -33,7 +33,7 @@ struct AnimateCommand {
   int frames = 0;  // 0: all of the animation
   int first = 0;
   double rate = 25;
-  PathPictureOptions picture{512, 512, 64, 1, false};
+  PathPictureOptions picture{512, 512, 64, 1, false, false};
   CachingOptions caching;
   std::optional<double> exposure_ev;
 
@@ -116,6 +116,8 @@ Verb add_animate(CLI::App& verb) {
       verb, "--filter", c.picture.centred, {{"box", false}, {"none", true}},
       "path: box: paths are spread over the pixel; none: all go through its middle, as "
       "those of other methods do");
+  add_choice<bool>(verb, "--noise", c.picture.frozen, {{"fresh", false}, {"frozen", true}},
+                   "path: frozen: the same random numbers in every frame");
   add_caching_options(verb, c.caching);
   verb.add_option_function<std::string>(
           "--size",

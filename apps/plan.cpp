@@ -7,12 +7,16 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "apps/option_parsers.h"
 #include "apps/repairs.h"
 #include "apps/scene_options.h"
 #include "apps/verbs.h"
+#include "caching/motion_plan.h"
+#include "core/error.h"
 #include "precompute/plan_scene.h"
 
 namespace haarlight {
@@ -35,6 +39,17 @@ std::string error_text(double error) {
   return error < 1e-4 ? "< 0.01 %" : fmt::format("{:.{}f} %", 100 * error, error < 0.1 ? 2 : 0);
 }
 
+// What of a glTF file moves; nothing of files that hold no animation that can be read, which is for
+// animate to complain about.
+std::optional<MotionPlan> motion_of(const std::filesystem::path& file) {
+  if (file.extension() != ".gltf" && file.extension() != ".glb") return std::nullopt;
+  try {
+    return plan_motion(AnimatedScene(file));
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
 struct PlanCommand {
   SceneOptions scene;
   MeshOptions options;
@@ -52,8 +67,16 @@ void PlanCommand::run() {
   const Plan plan = scene.vertices ? plan_mesh(staged.scene, planning)
                                    : plan_image(staged.scene, staged.stage.camera, planning);
   print_notes(scene.scene, plan.notes);
+  const std::optional<MotionPlan> motion = motion_of(scene.scene);
   if (json) {
-    fmt::print("{}\n", to_json(plan, true));
+    nlohmann::json out = nlohmann::json::parse(to_json(plan, true));
+    if (motion) {
+      out["method"] = {
+          {"name", to_string(motion->method)},  {"why", motion->why},
+          {"moving_triangles", motion->moving}, {"moving_lights", motion->moving_lights},
+          {"near_lights", motion->near_lights}, {"frames", motion->frames}};
+    }
+    fmt::print("{}\n", out.dump());
     return;
   }
   fmt::print("{:<16} {:<7} {:>13} {:>9} {:>10}  {}\n", "effect", "needed", "error without", "time",
@@ -70,6 +93,7 @@ void PlanCommand::run() {
       "by {} rays of low resolution in {}, which --effects auto takes first; and {} for the "
       "costs\n",
       plan.rays, seconds_text(plan.look_seconds), plan.pilot_rays);
+  if (motion) fmt::print("method {}: {}\n", to_string(motion->method), motion->why);
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ Image path_picture(const FrameTracer& tracer, const PathPictureOptions& options,
   const Camera camera = frame_camera(tracer.frame(), options.width, options.height);
   const Vec3 eye = tracer.visibility().to_local(camera.position);
   const std::uint64_t key =
-      mix_bits(options.seed, static_cast<std::uint64_t>(tracer.frame().frame));
+      mix_bits(options.seed, options.frozen ? 0 : static_cast<std::uint64_t>(tracer.frame().frame));
   Image picture(options.width, options.height);
   // So many rows between two looks at the clock and the keyboard.
   constexpr int kRows = 16;

@@ -13,11 +13,13 @@ struct PathPictureOptions {
   int width = 512, height = 512;  ///< pixels
   int samples = 64;               ///< paths a pixel, >= 1
   std::uint64_t seed = 1;         ///< another seed, other noise
+  bool frozen = false;            ///< the same random numbers in every frame
   bool centred = false;           ///< all paths through the middle of the pixel: no box filter
 };
 
 /// The frame as its camera sees it, radiance, box filter unless `centred`. Unbiased but for paths
-/// of more than 256 bounces. Random numbers depend on frame, pixel and sample alone: the same bits
+/// of more than 256 bounces. Random numbers depend on frame (unless
+/// `frozen`), pixel and sample alone: the same bits
 /// on any number of threads. Throws Error{missing} if the frame has no camera, Error{cancelled}
 /// when told to stop.
 Image path_picture(const FrameTracer& tracer, const PathPictureOptions& options,

@@ -9,11 +9,14 @@
 #include <filesystem>
 #include <string>
 
+#include "caching/motion_plan.h"
 #include "caching/path_picture.h"
 #include "core/error.h"
 #include "core/image_metrics.h"
 #include "core/parallel.h"
 #include "data_gen/animations.h"
+#include "data_gen/mesh_writer.h"
+#include "data_gen/scenes.h"
 
 namespace haarlight {
 namespace {
@@ -44,7 +47,7 @@ TEST(CachingMethod, PictureIsThatOfPaths) {
   o.hemisphere_samples = 400;
   CachingMethod method(scene, o);
   const FramePicture found = method.frame(30, {});
-  PathMethod paths(scene, {48, 36, 256, 1, true});
+  PathMethod paths(scene, {48, 36, 256, 1, true, true});
   const ImageDifference d = compare_images(found.radiance, paths.frame(30, {}).radiance);
   // Noise of 256 paths is 3.5 % here, of records 1 %; what Ward's accuracy of 0.2 leaves is as
   // much.
@@ -166,6 +169,25 @@ TEST(CachingMethod, GradientsAreNearerToTheTruthThanNone) {
   // samples a chord leaves little of it.
   EXPECT_LT(1 - accuracy[1], 0.85 * (1 - accuracy[0]));
   EXPECT_LT(1 - accuracy[2], 0.6 * (1 - accuracy[0])) << accuracy[1];
+}
+
+TEST(MotionPlan, SaysWhatMoves) {
+  const MotionPlan box = plan_motion(demo("cube-in-box"));
+  EXPECT_EQ(box.method, MotionPlan::Method::trc);
+  EXPECT_EQ(box.moving, 0.5);  // 12 of 24 triangles are the cube's
+  EXPECT_EQ(box.moving_lights, 0);
+  EXPECT_EQ(box.frames, 401);
+  const MotionPlan light = plan_motion(demo("moving-light"));
+  EXPECT_EQ(light.method, MotionPlan::Method::trc);
+  EXPECT_EQ(light.moving, 0);
+  EXPECT_EQ(light.moving_lights, 1);
+  // A still scene under distant light.
+  const auto file = std::filesystem::temp_directory_path() /
+                    ("haarlight-still" + std::to_string(::getpid()) + ".glb");
+  data_gen::save_scene(file, data_gen::make_scene("cornell"));
+  const MotionPlan still = plan_motion(AnimatedScene(file));
+  std::filesystem::remove(file);
+  EXPECT_EQ(still.method, MotionPlan::Method::prt) << still.why;
 }
 
 TEST(CachingMethod, StopsWhenTold) {
