@@ -10,6 +10,8 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "data_gen/gltf_material.h"
+#include "data_gen/png.h"
 
 namespace haarlight::data_gen {
 namespace {
@@ -79,26 +81,117 @@ std::size_t AnimatedWriter::add_material(const std::string& name, const Rgb& bas
   return push(gltf_["materials"], std::move(m));
 }
 
+std::size_t AnimatedWriter::add_index(const std::vector<std::uint32_t>& index) {
+  const std::size_t view = add_view(index.data(), index.size() * sizeof(std::uint32_t));
+  return push(gltf_["accessors"], {{"componentType", kUnsignedInt},
+                                   {"count", index.size()},
+                                   {"type", "SCALAR"},
+                                   {"bufferView", view}});
+}
+
+std::size_t AnimatedWriter::add_texture(const Image& picture, const std::vector<float>& alpha,
+                                        bool srgb) {
+  constexpr int kLinear = 9729, kRepeat = 10497;
+  if (!gltf_.contains("samplers")) {
+    gltf_["samplers"] = json::array(
+        {{{"magFilter", kLinear}, {"minFilter", kLinear}, {"wrapS", kRepeat}, {"wrapT", kRepeat}}});
+  }
+  std::string png = encode_png(picture, alpha, srgb);
+  const std::size_t size = png.size();
+  png.resize((size + 3) / 4 * 4, 0);  // numbers behind it stay aligned
+  const std::size_t view = add_view(png.data(), png.size());
+  gltf_["bufferViews"][view]["byteLength"] = size;
+  const std::size_t image =
+      push(gltf_["images"], {{"mimeType", "image/png"}, {"bufferView", view}});
+  return push(gltf_["textures"], {{"source", image}, {"sampler", 0}});
+}
+
 std::size_t AnimatedWriter::add_mesh(const Scene& body, std::size_t material) {
   std::vector<std::uint32_t> index;
   for (const Triangle& t : body.triangle) {
     index.insert(index.end(), t.vertex.begin(), t.vertex.end());
   }
-  triangles_ += body.triangle.size();
+  mesh_triangles_.push_back(body.triangle.size());
   json attributes;
   attributes["POSITION"] = add_floats(flat(body.position), 3, true);
   attributes["NORMAL"] = add_floats(flat(body.normal), 3, false);
-  const std::size_t view = add_view(index.data(), index.size() * sizeof(std::uint32_t));
-  const std::size_t indices = push(gltf_["accessors"], {{"componentType", kUnsignedInt},
-                                                        {"count", index.size()},
-                                                        {"type", "SCALAR"},
-                                                        {"bufferView", view}});
+  const std::size_t indices = add_index(index);
   return push(gltf_["meshes"], {{"primitives", json::array({{{"attributes", attributes},
                                                              {"indices", indices},
                                                              {"material", material}}})}});
 }
 
-std::size_t AnimatedWriter::add_node(json node) { return push(gltf_["nodes"], std::move(node)); }
+std::size_t AnimatedWriter::add_body(const Scene& body, std::span<const Scene> morphs) {
+  // Textures take their number in the file.
+  GltfTextures wanted;
+  std::vector<std::size_t> number;
+  const auto renumber = [&](json& holder, const char* key) {
+    if (!holder.contains(key)) return;
+    const auto local = holder[key]["index"].get<std::size_t>();
+    for (std::size_t i = number.size(); i < wanted.wanted().size(); ++i) {
+      const auto& [texture, srgb] = wanted.wanted()[i];
+      const auto t = static_cast<std::size_t>(texture);
+      number.push_back(add_texture(
+          body.texture[t], t < body.alpha.size() ? body.alpha[t] : std::vector<float>(), srgb));
+    }
+    holder[key]["index"] = number[local];
+  };
+  json primitives = json::array();
+  for (std::uint32_t m = 0; m < body.material.size(); ++m) {
+    // The vertices that this material uses, in a row.
+    constexpr std::uint32_t kUnused = 0xffffffffu;
+    std::vector<std::uint32_t> index, vertex, place(body.position.size(), kUnused);
+    for (const Triangle& t : body.triangle) {
+      if (t.material != m) continue;
+      for (const std::uint32_t v : t.vertex) {
+        if (place[v] == kUnused) {
+          place[v] = static_cast<std::uint32_t>(vertex.size());
+          vertex.push_back(v);
+        }
+        index.push_back(place[v]);
+      }
+    }
+    if (index.empty()) continue;
+    json material = gltf_material(body.material[m], true, wanted, extensions_);
+    renumber(material["pbrMetallicRoughness"], "baseColorTexture");
+    renumber(material["pbrMetallicRoughness"], "metallicRoughnessTexture");
+    renumber(material, "normalTexture");
+    const auto add_vectors = [&](const std::vector<Vec3>& all, const std::vector<Vec3>* from,
+                                 bool bounds) {
+      std::vector<Vec3> some;
+      for (const std::uint32_t v : vertex) some.push_back(from ? all[v] - (*from)[v] : all[v]);
+      return add_floats(flat(some), 3, bounds);
+    };
+    json primitive;
+    primitive["attributes"]["POSITION"] = add_vectors(body.position, nullptr, true);
+    primitive["attributes"]["NORMAL"] = add_vectors(body.normal, nullptr, false);
+    if (body.material[m].texture >= 0) {
+      std::vector<float> uv;
+      for (const std::uint32_t v : vertex) {
+        uv.push_back(body.uv[v][0]), uv.push_back(1 - body.uv[v][1]);  // v runs down
+      }
+      primitive["attributes"]["TEXCOORD_0"] = add_floats(uv, 2, false);
+    }
+    for (const Scene& morph : morphs) {
+      json target;
+      target["POSITION"] = add_vectors(morph.position, &body.position, true);
+      target["NORMAL"] = add_vectors(morph.normal, &body.normal, false);
+      primitive["targets"].push_back(target);
+    }
+    primitive["indices"] = add_index(index);
+    primitive["material"] = push(gltf_["materials"], std::move(material));
+    primitives.push_back(std::move(primitive));
+  }
+  mesh_triangles_.push_back(body.triangle.size());
+  json mesh{{"primitives", primitives}};
+  if (!morphs.empty()) mesh["weights"] = std::vector<double>(morphs.size(), 0.0);
+  return push(gltf_["meshes"], std::move(mesh));
+}
+
+std::size_t AnimatedWriter::add_node(json node) {
+  if (node.contains("mesh")) triangles_ += mesh_triangles_.at(node["mesh"].get<std::size_t>());
+  return push(gltf_["nodes"], std::move(node));
+}
 
 std::size_t AnimatedWriter::add_camera_node(const Camera& camera) {
   const std::size_t number =
@@ -121,12 +214,23 @@ std::size_t AnimatedWriter::add_point_light(const Rgb& tint, double intensity) {
 void AnimatedWriter::animate(std::size_t node, const std::string& path,
                              const std::vector<float>& seconds, const std::vector<float>& values,
                              const std::string& interpolation) {
-  const std::size_t width = path == "rotation" ? 4 : 3;
+  const std::size_t width = path == "weights" ? 1 : path == "rotation" ? 4 : 3;
   const std::size_t input = add_floats(seconds, 1, true);
   const std::size_t output = add_floats(values, width, false);
   const std::size_t sampler =
       push(samplers_, {{"input", input}, {"output", output}, {"interpolation", interpolation}});
   channels_.push_back({{"sampler", sampler}, {"target", {{"node", node}, {"path", path}}}});
+}
+
+void AnimatedWriter::animate(std::size_t node, const std::string& path, double seconds, int pieces,
+                             const std::function<std::vector<double>(double second)>& value) {
+  std::vector<float> times, values;
+  for (int k = 0; k <= pieces; ++k) {
+    const double t = seconds * k / pieces;
+    times.push_back(static_cast<float>(t));
+    for (const double x : value(t)) values.push_back(static_cast<float>(x));
+  }
+  animate(node, path, times, values);
 }
 
 void AnimatedWriter::save(const std::filesystem::path& file) const {
@@ -136,13 +240,21 @@ void AnimatedWriter::save(const std::filesystem::path& file) const {
   }
   json gltf = gltf_;
   gltf["asset"] = {{"version", "2.0"}, {"generator", "haarlight-data"}};
+  std::vector<bool> child(gltf["nodes"].size(), false);
+  for (const json& node : gltf["nodes"]) {
+    for (const json& c : node.value("children", json::array()))
+      child.at(c.get<std::size_t>()) = true;
+  }
   json roots = json::array();
-  for (std::size_t n = 0; n < gltf["nodes"].size(); ++n) roots.push_back(n);
+  for (std::size_t n = 0; n < child.size(); ++n) {
+    if (!child[n]) roots.push_back(n);
+  }
   gltf["scenes"] = json::array({{{"nodes", roots}}});
   gltf["scene"] = 0;
   gltf["buffers"] = json::array({{{"byteLength", bytes_.size()}}});
   json used = json::array({"KHR_materials_emissive_strength"});
   if (gltf.contains("extensions")) used.push_back("KHR_lights_punctual");
+  for (const std::string& extension : extensions_) used.push_back(extension);
   gltf["extensionsUsed"] = used;
   if (!channels_.empty()) {
     gltf["animations"] = json::array({{{"channels", channels_}, {"samplers", samplers_}}});

@@ -21,6 +21,7 @@
 #include "data_gen/merl.h"
 #include "data_gen/mesh_writer.h"
 #include "data_gen/scenes.h"
+#include "precompute/scene_import.h"
 
 namespace haarlight::data_gen {
 namespace {
@@ -96,7 +97,7 @@ void list() {
     fmt::print("  {:<12} {}\n", entry.name, entry.description);
   fmt::print("\nanimations (haarlight-data animation NAME -o FILE.glb):\n");
   for (const AnimationEntry& entry : animations()) {
-    fmt::print("  {:<12} {}\n", entry.name, entry.description);
+    fmt::print("  {:<13} {}\n", entry.name, entry.description);
   }
   fmt::print("\nenvironments (haarlight-data environment NAME -o FILE.exr):\n");
   for (const EnvironmentEntry& entry : environments()) {
@@ -125,6 +126,14 @@ int run(int argc, char** argv) {
       ->required()
       ->check(CLI::IsMember(names(animations())));
   animation->add_option("-o,--output", file, "FILE.glb")->required();
+  AnimationOptions moving;
+  std::filesystem::path mesh;
+  animation->add_option("--count", moving.count, "bunnies: how many of the nine move, 1 to 9")
+      ->check(CLI::Range(1, 9))
+      ->capture_default_str();
+  animation->add_option(
+      "--mesh", mesh,
+      "bunnies, cornell-bunny: FILE.obj, .ply, .glb or .gltf in place of the bunny");
 
   CLI::App* environment =
       app.add_subcommand("environment", "Write an environment as a picture of radiance");
@@ -160,7 +169,8 @@ int run(int argc, char** argv) {
   }
   if (*scene) write_scene(name, seed, file);
   if (*animation) {
-    const std::size_t triangles = save_animation(file, name);
+    if (!mesh.empty()) moving.figure = import_scene(mesh);
+    const std::size_t triangles = save_animation(file, name, moving);
     fmt::print("{}: {} triangles\n", file.string(), triangles);
   }
   if (*environment) write_environment(name, seed, layout, size, file);

@@ -1,4 +1,5 @@
 haarlight_test(data_gen/environments haarlight_data_gen haarlight_wavelet haarlight_core)
+haarlight_test(data_gen/isosurface haarlight_data_gen haarlight_core)
 haarlight_test(data_gen/mesh_builder haarlight_data_gen haarlight_core)
 haarlight_test(data_gen/projections haarlight_data_gen haarlight_wavelet haarlight_core)
 haarlight_test(data_gen/scenes haarlight_data_gen haarlight_reference haarlight_core
