@@ -15,6 +15,7 @@
 #include "apps/verbs.h"
 #include "caching/animated_scene.h"
 #include "caching/animation_method.h"
+#include "caching/environment_light.h"
 #include "caching/path_picture.h"
 #include "core/atomic_file.h"
 #include "core/image_io.h"
@@ -28,7 +29,8 @@ constexpr int kMaxSamples = 1 << 20;
 constexpr double kMaxRate = 1000, kMaxExposure = 64;
 
 struct AnimateCommand {
-  std::filesystem::path scene, folder, metrics;
+  std::filesystem::path scene, folder, metrics, env;
+  double env_turn = 0, env_speed = 0;  // degrees, degrees a second
   std::string method = "path";
   int frames = 0;  // 0: all of the animation
   int first = 0;
@@ -65,7 +67,12 @@ void AnimateCommand::run() const {
   if (folder.empty() && metrics.empty()) {
     throw CLI::ValidationError("-o", "'', expected a folder for pictures, or --metrics FILE.csv");
   }
-  const AnimatedScene animation(scene, rate);
+  AnimatedScene animation(scene, rate);
+  if (!env.empty()) {
+    constexpr double kDegree = kPi / 180;
+    animation.set_environment(std::make_shared<const EnvironmentLight>(load_environment(env)),
+                              env_turn * kDegree, env_speed * kDegree);
+  }
   const int count = frames > 0 ? frames : std::max(animation.frames() - first, 1);
   frame_camera(animation.at(first), picture.width, picture.height);  // refused before any work
   if (!folder.empty()) require_writable_folder(folder);
@@ -107,6 +114,10 @@ Verb add_animate(CLI::App& verb) {
                           {{"path", "path"}, {"irc", "irc"}, {"trc", "trc"}},
                           "path: path tracing, all bounces; irc: irradiance caching, anew every "
                           "frame; trc: temporal radiance caching");
+  add_path(verb, "--env", c.env, "FILE",
+           "a picture behind everything, EXR or HDR, in place of the scene's");
+  add_number(verb, "--env-turn", c.env_turn, -1e6, 1e6, "turn of --env about +Y, degrees");
+  add_number(verb, "--env-speed", c.env_speed, -1e6, 1e6, "and how it turns, degrees a second");
   add_integer(verb, "--frames", c.frames, 0, kMaxFrames,
               "how many; 0: to the end of the animation");
   add_integer(verb, "--first", c.first, 0, kMaxFrames, "number of the first");
@@ -148,8 +159,11 @@ Verb add_animate(CLI::App& verb) {
   verb.footer(
       "\nMoves: nodes, morph targets, cameras, lights (KHR_lights_punctual), and the numbers of\n"
       "materials, lights and cameras by KHR_animation_pointer. Light: lamps, shining triangles\n"
-      "(emissiveFactor times KHR_materials_emissive_strength) and one radiance behind everything\n"
-      "(the scene's extras, \"haarlight\": {\"background\": [r, g, b]}).\n"
+      "(emissiveFactor times KHR_materials_emissive_strength), one radiance behind everything "
+      "(the\n"
+      "scene's extras, \"haarlight\": {\"background\": [r, g, b]}) and a picture (--env, or in "
+      "the\n"
+      "extras, \"environment\": {\"uri\": \"sky.exr\", \"rotation\": radians}).\n"
       "\nExample:\n"
       "  haarlight-data animation cube-in-box -o box.glb\n"
       "  haarlight animate box.glb --frames 10 --size 256x192 --spp 32 -o out/box");

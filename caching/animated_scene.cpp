@@ -84,6 +84,7 @@ struct State {
   std::vector<RgbD> light_color;
   std::vector<double> light_intensity;
   std::vector<double> yfov;
+  double environment_turn = 0;  // radians about +Y
 };
 
 struct Channel {
@@ -135,6 +136,11 @@ struct AnimatedScene::Parts {
   std::vector<std::uint32_t> owner;  // node of a triangle
   std::size_t camera_node = kNone;
   RgbD background;
+  std::shared_ptr<const EnvironmentLight> environment;
+  double turn_a_second = 0;  // of it, beside what keys say
+  std::size_t scene_number = 0;
+  std::vector<Vec3> carried;      // by node: what a person did
+  std::optional<Camera> seen_by;  // in place of the file's
   double rate = 25, end = 0;
 
   void read(const GltfDocument& file);
@@ -176,11 +182,19 @@ void AnimatedScene::Parts::read_nodes(const GltfDocument& file) {
   // import_scene() has refused circles and numbers out of range; a node met twice is refused here.
   const json& scenes = file.list("scenes");
   const auto number = file.json().value("scene", std::size_t{0});
+  scene_number = number;
   if (number < scenes.size()) {
     for (const json& root : scenes.at(number).value("nodes", json::array())) {
       order.push_back(root.get<std::size_t>());
     }
     background = read_rgb(inside(scenes.at(number), {"extras", "haarlight"}), "background", {});
+    const json& picture = inside(scenes.at(number), {"extras", "haarlight", "environment"});
+    start.environment_turn = picture.value("rotation", 0.0);
+    if (picture.contains("uri")) {
+      const std::filesystem::path beside = std::filesystem::path(file.name()).parent_path();
+      environment = std::make_shared<const EnvironmentLight>(
+          load_environment(beside / picture.at("uri").get<std::string>()));
+    }
   }
   for (std::size_t i = 0; i < order.size(); ++i) {
     if (order.size() > nodes.size()) {
@@ -366,6 +380,10 @@ std::function<void(State&, const std::vector<double>&)> AnimatedScene::Parts::ta
     width = 1;
     return [c](State& s, const auto& v) { s.yfov[c] = v[0]; };
   }
+  if (pointer == fmt::format("/scenes/{}/extras/haarlight/environment/rotation", scene_number)) {
+    width = 1;
+    return [](State& s, const auto& v) { s.environment_turn = v[0]; };
+  }
   throw Error(ErrorKind::format,
               fmt::format("{}: an animation points to \"{}\", expected one of the numbers of "
                           "materials, lights and cameras that can change",
@@ -451,10 +469,44 @@ AnimatedScene::AnimatedScene(const std::filesystem::path& file, double frames_pe
   look.position.clear(), look.normal.clear(), look.uv.clear(), look.uv2.clear();
   look.tint.clear(), look.triangle.clear();
   parts_->read(GltfDocument(file));
+  parts_->carried.resize(parts_->start.node.size());
 }
 
 AnimatedScene::~AnimatedScene() = default;
 AnimatedScene::AnimatedScene(AnimatedScene&&) noexcept = default;
+
+RgbD AnimatedFrame::background_from(const Vec3& direction) const {
+  if (!environment) return background;
+  return background + environment->radiance(environment_turn.transposed() * direction);
+}
+
+void AnimatedScene::set_environment(std::shared_ptr<const EnvironmentLight> light, double start,
+                                    double a_second) {
+  parts_->environment = std::move(light);
+  parts_->start.environment_turn = start;
+  parts_->turn_a_second = a_second;
+}
+
+void AnimatedScene::carry(std::uint32_t node, const Vec3& metres) {
+  if (node >= parts_->carried.size()) {
+    throw Error(ErrorKind::invalid_argument,
+                fmt::format("{}: node {} is not there, expected below {}", parts_->look.name, node,
+                            parts_->carried.size()));
+  }
+  parts_->carried[node] = metres;
+}
+
+Vec3 AnimatedScene::carried(std::uint32_t node) const { return parts_->carried.at(node); }
+
+void AnimatedScene::set_camera(const std::optional<Camera>& camera) { parts_->seen_by = camera; }
+
+std::vector<std::uint32_t> AnimatedScene::light_nodes() const {
+  std::vector<std::uint32_t> nodes;
+  for (const std::size_t n : parts_->order) {
+    if (parts_->start.node[n].light != kNone) nodes.push_back(static_cast<std::uint32_t>(n));
+  }
+  return nodes;
+}
 
 int AnimatedScene::frames() const {
   const double last = std::floor(parts_->end * parts_->rate + 1e-6);
@@ -533,6 +585,8 @@ AnimatedFrame AnimatedScene::at(int frame) const {
   AnimatedFrame out;
   out.frame = frame;
   out.background = p.background;
+  out.environment = p.environment;
+  out.environment_turn = rotation_y(now.environment_turn + p.turn_a_second * (frame / p.rate));
   out.scene = p.look;
   out.scene.material = now.material;
   out.scene.camera.reset();
@@ -543,6 +597,7 @@ AnimatedFrame AnimatedScene::at(int frame) const {
   for (const std::size_t n : p.order) {
     const Node& node = now.node[n];
     world[n] = node.parent == kNone ? node.local() : world[node.parent] * node.local();
+    world[n].origin = world[n].origin + p.carried[n];
     if (node.mesh != kNone) {
       for (const Primitive& part : p.mesh[node.mesh].primitive) {
         add_primitive(part, world[n], node.weights, out.scene);
@@ -559,6 +614,7 @@ AnimatedFrame AnimatedScene::at(int frame) const {
       out.light.push_back(light);
     }
   }
+  if (p.seen_by) out.scene.camera = p.seen_by;
   if (p.camera_node != kNone && !out.scene.camera) {
     throw Error(ErrorKind::missing, fmt::format("{}: frame {} has no camera that can see, expected "
                                                 "a node of some size",

@@ -5,8 +5,10 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include "caching/environment_light.h"
 #include "caching/scene_light.h"
 #include "precompute/scene.h"
 
@@ -24,7 +26,13 @@ struct AnimatedFrame {
   Scene scene;                     ///< world space; triangles in the same order in every frame
   std::vector<Emission> emission;  ///< one a material
   std::vector<SceneLight> light;
-  RgbD background;  ///< radiance of what is behind everything
+  RgbD background;  ///< radiance of what is behind everything, the same all round
+  std::shared_ptr<const EnvironmentLight> environment;  ///< a picture added to it, or null
+  Rotation
+      environment_turn;  ///< light of the picture's direction d comes from environment_turn * d
+
+  /// What comes from a direction (unit, world) where nothing is in the way.
+  RgbD background_from(const Vec3& direction) const;
 };
 
 /// Reads .gltf and .glb. What moves:
@@ -41,6 +49,8 @@ struct AnimatedFrame {
 ///   /extensions/KHR_lights_punctual/lights/N/intensity and color, /cameras/N/perspective/yfov.
 /// Intensities are radiometric: W/sr, directional lights W/m^2. The scene's
 /// "extras": {"haarlight": {"background": [r, g, b]}} is the radiance behind everything, else none.
+/// "environment": {"uri": "sky.exr", "rotation": radians} beside it is a picture behind everything,
+/// turned about +Y by an angle that /scenes/N/extras/haarlight/environment/rotation can change.
 /// Materials and textures are read as by import_scene(). Skins, vertex colours and emissive
 /// textures are not read.
 class AnimatedScene {
@@ -54,11 +64,26 @@ class AnimatedScene {
   /// Throws Error{missing} without a camera unless the file has none at all.
   AnimatedFrame at(int frame) const;
 
+  /// A picture behind everything in place of the file's, or none: null. It turns about +Y by so
+  /// many radians a second, from `start` on.
+  void set_environment(std::shared_ptr<const EnvironmentLight> light, double start = 0,
+                       double a_second = 0);
+
+  /// What a person changes while it plays, on top of what the file says, in all frames asked for
+  /// from then on: a node and what hangs on it is carried by so many metres in the world; what it
+  /// is seen by (the file's camera again: none). Throws Error{invalid_argument} for a node that is
+  /// not there.
+  void carry(std::uint32_t node, const Vec3& metres);
+  Vec3 carried(std::uint32_t node) const;
+  void set_camera(const std::optional<Camera>& camera);
+
   /// From the first to the last key, both included; 1 for a scene without animation.
   int frames() const;
   std::size_t triangle_count() const;
   /// The node's number in the file that a triangle hangs on: one body, unless its mesh deforms.
   std::uint32_t instance_of(std::uint32_t triangle) const;
+  /// The nodes of AnimatedFrame::light, in its order.
+  std::vector<std::uint32_t> light_nodes() const;
 
  private:
   struct Parts;

@@ -158,6 +158,21 @@ RgbD FrameTracer::direct(const SurfaceHit& surface, const Bsdf& bsdf, PathRandom
   return sum;
 }
 
+RgbD FrameTracer::environment_light(const SurfaceHit& surface, const Bsdf& bsdf, PathRandom& random,
+                                    bool mis) const {
+  if (!frame_.environment || bsdf.is_specular()) return {};
+  const double u = random.next(), v = random.next();
+  const EnvironmentLight::Sample sample = frame_.environment->sample(u, v);
+  const Vec3 w = frame_.environment_turn * sample.from;
+  const RgbD f = reflected(bsdf, w);
+  if (!(l1_norm(f) > 0)) return {};
+  const Vec3 from = off_surface(surface.position, surface.geometric_normal, w);
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  if (visibility_.occluded(floats(from), w, kInfinity)) return {};
+  const double weight = mis ? power_heuristic(sample.pdf, PartChances(bsdf).pdf(bsdf, w)) : 1;
+  return f * frame_.environment->radiance(sample.from) * (weight / sample.pdf);
+}
+
 RgbD FrameTracer::lobe_light(const SurfaceHit& surface, const Bsdf& bsdf, PathRandom& random,
                              int samples) const {
   RgbD sum;
@@ -188,7 +203,14 @@ RgbD FrameTracer::radiance(const std::optional<Visibility::Hit>& first, const Ve
   Vec3 from = begin, direction = begin_direction;
   double pdf = 0;  // of the last direction; 0: the only one there was
   for (int bounce = 0; bounce < kMostBounces; ++bounce) {
-    if (!hit) return sum + passed * frame_.background;
+    if (!hit) {
+      sum += passed * frame_.background;
+      if (!frame_.environment) return sum;
+      const Vec3 in_picture = frame_.environment_turn.transposed() * direction;
+      const double other = pdf > 0 ? frame_.environment->pdf(in_picture) : 0;
+      return sum + passed * frame_.environment->radiance(in_picture) *
+                       (pdf > 0 ? power_heuristic(pdf, other) : 1);
+    }
     const SurfaceHit surface = surface_at(frame_.scene, visibility_, *hit, direction);
     if (l1_norm(extinction) > 0) {
       passed = passed * extinguished(extinction, visibility_.to_world_length(surface.distance));
@@ -201,6 +223,7 @@ RgbD FrameTracer::radiance(const std::optional<Visibility::Hit>& first, const Ve
     }
     const Bsdf bsdf = bsdf_at(frame_.scene, surface);
     sum += passed * direct(surface, bsdf, random, true, bounce == 0 ? lamps : nullptr);
+    if (frame_.environment) sum += passed * environment_light(surface, bsdf, random, true);
 
     // One way on.
     const PartChances part(bsdf);

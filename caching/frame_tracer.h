@@ -42,6 +42,12 @@ class FrameTracer {
   RgbD direct(const SurfaceHit& surface, const Bsdf& bsdf, PathRandom& random, bool mis,
               LampShare* lamps = nullptr) const;
 
+  /// An unbiased estimate of the light of the environment's picture that a surface sends to its
+  /// viewer after one reflection, by one sample of the picture; `mis` as above. None without a
+  /// picture: a background that is the same all round is best found by the BSDF.
+  RgbD environment_light(const SurfaceHit& surface, const Bsdf& bsdf, PathRandom& random,
+                         bool mis) const;
+
   /// An unbiased estimate of what a surface sends to its viewer by way of its lobe, of light that
   /// has been reflected before, and of the background.
   RgbD lobe_light(const SurfaceHit& surface, const Bsdf& bsdf, PathRandom& random,

@@ -20,7 +20,7 @@ void follow(const FrameTracer& tracer, const Vec3& from, const Vec3& direction, 
   const Visibility& visibility = tracer.visibility();
   const auto hit = visibility.first_hit(from, direction);
   if (!hit) {
-    without += weight * tracer.frame().background;
+    without += weight * tracer.frame().background_from(direction);
     return;
   }
   const SurfaceHit surface = surface_at(scene, visibility, *hit, direction);

@@ -121,7 +121,8 @@ Hemisphere reprojected(const Hemisphere& now, const std::vector<SeenPlace>& seen
     if (triangle == SeenPlace::kBelow) {
       // The body's own ground turns with it.
     } else if (triangle == SeenPlace::kBackground) {
-      radiance = change.next().background;  // the same all round: it need not turn
+      // What lies that way then: body and picture may have turned.
+      radiance = change.next().background_from(normalize(at.to_world(now.direction[i])));
     } else {
       const PlaceFrame there = place_in(change.next().scene, seen[i].place);
       radiance = next_radiance(seen[i], radiance, there, change);

@@ -5,16 +5,20 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <string>
+#include <utility>
 
 #include "caching/keyframes.h"
 #include "core/error.h"
+#include "core/image_io.h"
 #include "data_gen/animations.h"
 
 namespace haarlight {
@@ -175,6 +179,62 @@ TEST(Keyframes, RotationsTakeTheShorterArcAtAnEvenRate) {
   }
 }
 
+TEST(AnimatedScene, APictureBehindEverythingTurnsByKeys) {
+  // Blue, but for a red quarter about +X: u = 3/4.
+  Image picture(16, 8);
+  for (int y = 0; y < 8; ++y) {
+    for (int x = 0; x < 16; ++x) {
+      picture.at(x, y) = x >= 10 && x < 14 ? Rgb{1, 0, 0} : Rgb{0, 0, 1};
+    }
+  }
+  save_image(scratch("sky.exr"), picture);
+  SmallGltf file;
+  const auto time = file.add({0, 1}, "SCALAR", 1);
+  const auto turn = file.add({0, static_cast<float>(kPi)}, "SCALAR", 1);
+  file.gltf["scenes"][0]["extras"]["haarlight"]["environment"] = {{"uri", "sky.exr"}};
+  json pointed{{"path", "pointer"}};
+  pointed["extensions"]["KHR_animation_pointer"]["pointer"] =
+      "/scenes/0/extras/haarlight/environment/rotation";
+  file.gltf["animations"].push_back({{"samplers", {{{"input", time}, {"output", turn}}}},
+                                     {"channels", {{{"sampler", 0}, {"target", pointed}}}}});
+  const AnimatedScene scene(file.write("sky"), 2);  // half a second a frame
+  // A quarter turn a frame about +Y: from +X to -Z and to -X.
+  const Vec3 where[] = {{1, 0, 0}, {0, 0, -1}, {-1, 0, 0}};
+  for (int frame = 0; frame < 3; ++frame) {
+    const AnimatedFrame now = scene.at(frame);
+    for (int other = 0; other < 3; ++other) {
+      const RgbD light = now.background_from(where[other]);
+      EXPECT_NEAR(light.r, other == frame ? 1 : 0, 1e-6) << frame << other;
+      EXPECT_NEAR(light.b, other == frame ? 0 : 1, 1e-6) << frame << other;
+    }
+  }
+  file.gltf["scenes"][0]["extras"]["haarlight"]["environment"] = {{"uri", "nowhere.exr"}};
+  EXPECT_THROW(AnimatedScene(file.write("no sky")), Error);
+}
+
+TEST(AnimatedScene, WhatAPersonCarriesStaysThere) {
+  AnimatedScene scene(SmallGltf().write("carried"), 2);
+  const AnimatedFrame before = scene.at(1);
+  // Node 1, the triangle, hangs on node 0; node 3 is the lamp.
+  scene.carry(0, {0, 1, 0});
+  scene.carry(1, {0.5, 0, 0});
+  ASSERT_EQ(scene.light_nodes(), std::vector<std::uint32_t>{3});
+  scene.carry(3, {0, 0, 2});
+  Camera camera = look_at({1, 2, 3}, {0, 0, 0}, 0.5, 8, 8);
+  scene.set_camera(camera);
+  const AnimatedFrame after = scene.at(1);
+  for (std::size_t v = 0; v < 3; ++v) {
+    expect_near(after.scene.position[v], before.scene.position[v] + Vec3{0.5, 1, 0});
+  }
+  expect_near(after.light[0].position, before.light[0].position + Vec3{0, 0, 2});
+  EXPECT_EQ(after.scene.camera, camera);
+  scene.carry(0, {}), scene.carry(1, {}), scene.carry(3, {});
+  scene.set_camera({});
+  EXPECT_EQ(scene.at(1).scene.position, before.scene.position);
+  EXPECT_EQ(scene.at(1).scene.camera, before.scene.camera);
+  EXPECT_THROW(scene.carry(4, {}), Error);
+}
+
 TEST(AnimatedScene, WrongAnimationsAreRefusedByName) {
   const auto refused = [](SmallGltf& file, const std::string& name) {
     try {
@@ -210,6 +270,73 @@ TEST(AnimatedScene, DataScenesAreReadAsTheyWereMade) {
         a.scene.position != b.scene.position || a.light[0].position != b.light[0].position;
     EXPECT_TRUE(moves) << entry.name;
   }
+}
+
+TEST(AnimatedScene, DataScenesAreAsLargeAsThoseOfThePapers) {
+  // Gautron and others 2007, section 6; Debattista and others 2009, Figure 1.
+  const std::pair<const char*, double> wanted[] = {
+      {"flying-kite", 28e3}, {"spheres", 64e3}, {"interior", 200e3}, {"cornell-bunny", 65e3}};
+  for (const auto& [name, size] : wanted) {
+    const auto triangles = static_cast<double>(
+        data_gen::save_animation(scratch(std::string("size ") + name + ".glb"), name));
+    EXPECT_NEAR(triangles, size, 0.1 * size) << name;
+  }
+}
+
+TEST(AnimatedScene, AKiteOfPaintedClothIsRead) {
+  const auto file = scratch("kite.glb");
+  data_gen::save_animation(file, "flying-kite");
+  const AnimatedScene animation(file);
+  const AnimatedFrame a = animation.at(0), b = animation.at(13);
+  // The cloth: where its material is, a picture of 128 x 128 with a blue disc about (0.5, 0.66).
+  const auto cloth = std::find_if(a.scene.material.begin(), a.scene.material.end(),
+                                  [](const Material& m) { return m.name == "kite cloth"; });
+  ASSERT_NE(cloth, a.scene.material.end());
+  ASSERT_GE(cloth->texture, 0);
+  const Image& picture = a.scene.texture[static_cast<std::size_t>(cloth->texture)];
+  EXPECT_EQ(picture.width, 128);
+  const Rgb disc = picture.at(70, 128 * 40 / 100);
+  EXPECT_GT(disc.b, 2 * disc.r);
+  // It bends: a rigid body keeps all distances, a cloth that waves does not.
+  const auto material = static_cast<std::uint32_t>(cloth - a.scene.material.begin());
+  double most = 0;
+  for (const Triangle& t : a.scene.triangle) {
+    if (t.material != material) continue;
+    const auto side = [&](const AnimatedFrame& f) {
+      return length(f.scene.position[t.vertex[0]] - f.scene.position[t.vertex[2]]);
+    };
+    most = std::max(most, std::abs(side(b) / side(a) - 1));
+    for (const std::uint32_t v : t.vertex) {
+      EXPECT_GE(a.scene.uv[v][1], -1e-6f);
+      EXPECT_LE(a.scene.uv[v][1], 1 + 1e-6f);
+    }
+  }
+  EXPECT_GT(most, 1e-3);
+}
+
+TEST(AnimatedScene, AsManyBunniesBounceAsAreAskedFor) {
+  for (const int count : {1, 4, 9}) {
+    const auto file = scratch("bunnies.glb");
+    data_gen::AnimationOptions options;
+    options.count = count;
+    Scene tetrahedron;  // in place of the bunny, so that the file is small
+    tetrahedron.position = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    tetrahedron.normal.assign(4, {0, 1, 0}), tetrahedron.uv.resize(4);
+    tetrahedron.triangle = {{{0, 2, 1}, 0}, {{0, 1, 3}, 0}, {{0, 3, 2}, 0}, {{1, 2, 3}, 0}};
+    options.figure = tetrahedron;
+    EXPECT_EQ(data_gen::save_animation(file, "bunnies", options), 12u + 9 * 4u);
+    const AnimatedScene scene(file);
+    const AnimatedFrame a = scene.at(3), b = scene.at(9);
+    std::set<std::uint32_t> moved;
+    for (std::uint32_t t = 0; t < scene.triangle_count(); ++t) {
+      const auto v = a.scene.triangle[t].vertex[0];
+      if (a.scene.position[v] != b.scene.position[v]) moved.insert(scene.instance_of(t));
+    }
+    EXPECT_EQ(moved.size(), static_cast<std::size_t>(count));
+  }
+  data_gen::AnimationOptions ten;
+  ten.count = 10;
+  EXPECT_THROW(data_gen::save_animation(scratch("ten.glb"), "bunnies", ten), Error);
 }
 
 }  // namespace

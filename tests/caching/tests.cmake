@@ -1,4 +1,5 @@
 haarlight_test(caching/animated_scene haarlight_caching haarlight_data_gen)
+haarlight_test(caching/environment_light haarlight_caching)
 haarlight_test(caching/path_picture haarlight_caching)
 haarlight_test(caching/records haarlight_caching)
 haarlight_test(caching/caching_method haarlight_caching haarlight_data_gen)
