@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -26,16 +27,17 @@
 namespace haarlight {
 namespace {
 
-constexpr int kVerticesPerCluster[] = {50, 100, 200,
-                                       400};  // tried where clusters are ours to choose
-constexpr std::size_t kPilots = 64;
+constexpr int kVerticesPerCluster[] = {400, 200, 100, 50};  // tried where they are ours to choose
+constexpr double kWorthIt = 0.95;  // of the bytes, that more clusters must save
+constexpr double kGivesUp = 1.1;   // of the bytes: no more clusters are tried
+constexpr std::size_t kPilots = 64, kSearchPilots = 24;  // clusters looked at closely
 constexpr int kAims = 5;           // files written at most until the error is what was asked for
 constexpr double kBlockBytes = 6;  // of a stored block beside its 16 entries, about
 constexpr std::size_t kMostByError = 96;  // vectors a cluster, where the error decides
 constexpr int kClusteringBasis = 8;       // axes of a flat while vertices are shared out
 
 // Shares of the whole that steps of the work take.
-constexpr double kSketched = 0.25, kClustered = 0.4, kTuned = 0.5, kFound = 0.95;
+constexpr double kSketched = 0.25, kClustered = 0.4, kSearched = 0.46, kTuned = 0.5, kFound = 0.95;
 
 void check(const CompressOptions& o, std::size_t vertices) {
   const auto refuse = [](const char* what, auto value, const std::string& wanted) {
@@ -76,7 +78,7 @@ class Compressor {
   }
   Progress part(double from, double to) const;
   void share_out(int clusters, const Progress& progress);
-  void look_at_pilots(const Progress& progress);
+  void look_at_pilots(std::size_t most, const Progress& progress);
   void choose_clusters();
   void choose_vectors(double error);
   double estimated_bytes() const;
@@ -143,7 +145,7 @@ void Compressor::share_out(int clusters, const Progress& progress) {
 }
 
 // A few clusters are taken apart as widely as any choice wants them.
-void Compressor::look_at_pilots(const Progress& progress) {
+void Compressor::look_at_pilots(std::size_t most, const Progress& progress) {
   const auto clusters = static_cast<std::size_t>(report_.clusters);
   sigma_.assign(clusters, {});
   parallel_for(static_cast<int>(clusters), [&](int i) {
@@ -151,53 +153,59 @@ void Compressor::look_at_pilots(const Progress& progress) {
     sigma_[c] = estimated_sizes(sketch_, members(c));
     for (double& s : sigma_[c]) s *= std::sqrt(static_cast<double>(weights_.vertices_of(c)));
   });
-  const std::size_t step = std::max<std::size_t>(1, clusters / kPilots);
+  const std::size_t step = std::max<std::size_t>(1, clusters / most);
   std::vector<std::size_t> pilots;
   for (std::size_t c = step / 2; c < clusters; c += step) pilots.push_back(c);
-  std::vector<ClusterBasis> bases(pilots.size());
+  // Bases are large: a thread has one at a time.
+  std::vector<VectorTuning::Cluster> measured(pilots.size());
   parallel_for(static_cast<int>(pilots.size()), [&](int i) {
-    const auto p = static_cast<std::size_t>(i);
-    bases[p] = find_basis(rows_, sketch_, members(pilots[p]), most_, lightings_);
+    const std::size_t c = pilots[static_cast<std::size_t>(i)];
+    const ClusterBasis basis = find_basis(rows_, sketch_, members(c), most_, lightings_);
+    measured[static_cast<std::size_t>(i)] = tuning_.measured(basis, members(c).size(), sigma_[c]);
   });
   tuning_.clear();
-  for (std::size_t p = 0; p < pilots.size(); ++p) {
-    tuning_.add(bases[p], members(pilots[p]).size(), sigma_[pilots[p]]);
-  }
+  for (VectorTuning::Cluster& cluster : measured) tuning_.add(std::move(cluster));
   if (progress && !progress(1)) throw Error(ErrorKind::cancelled, "compression stopped on request");
 }
 
-// The number of clusters with the smallest file, as far as a few of them tell.
+// The fewest clusters whose file is about as small as any that were tried.
 void Compressor::choose_clusters() {
   if (options_.clusters > 0) {
     share_out(options_.clusters, part(kSketched, kClustered));
-    look_at_pilots(part(kClustered, kTuned));
+    look_at_pilots(kPilots, part(kClustered, kTuned));
     return;
   }
-  const auto vertices = static_cast<int>(rows_.vertices());
-  double least = 0, least_left = 0;
-  int best = 0, tried = 0;
-  const auto look_at = [&](int clusters, double from, double to) {
-    share_out(clusters, part(from, 0.7 * to + 0.3 * from));
-    look_at_pilots(part(from, to));
-    choose_vectors(options_.error);
+  struct Try {
+    ClusterWeights weights;
+    int clusters = 0;
+    std::vector<double> inertia;
+    double bytes = 0, left = 0;
   };
-  constexpr double kEach = (kTuned - kSketched) / (std::size(kVerticesPerCluster) + 1.0);
-  std::vector<int> counts;
+  std::optional<Try> best;
+  const auto vertices = static_cast<int>(rows_.vertices());
+  constexpr double kEach = (kSearched - kSketched) / std::size(kVerticesPerCluster);
+  double from = kSketched;
   for (const int size : kVerticesPerCluster) {
     const int clusters = std::max(1, vertices / size);
-    if (counts.empty() || counts.back() != clusters) counts.push_back(clusters);
+    from += kEach;
+    if (best && clusters <= best->clusters) continue;  // few vertices
+    share_out(clusters, part(from - kEach, from - 0.3 * kEach));
+    look_at_pilots(kSearchPilots, part(from - 0.3 * kEach, from));
+    choose_vectors(options_.error);
+    Try now{weights_, report_.clusters, report_.inertia, estimated_bytes(), 0};
+    now.left = std::max(report_.basis_error - options_.error, 0.0);
+    // Where the error is out of reach, what comes nearest. More clusters take longer to find and
+    // to relight: they must be worth it.
+    const bool better = !best || now.left < best->left ||
+                        (now.left == best->left && now.bytes < kWorthIt * best->bytes);
+    const bool worse = best && now.left == best->left && now.bytes > kGivesUp * best->bytes;
+    if (better) best = std::move(now);
+    if (worse) break;
   }
-  for (const int clusters : counts) {
-    const double from = kSketched + kEach * tried++;
-    look_at(clusters, from, from + kEach);
-    // Where the error is out of reach, what comes nearest; else the smallest file.
-    const double bytes = estimated_bytes();
-    const double left = std::max(report_.basis_error - options_.error, 0.0);
-    if (best == 0 || left < least_left || (left == least_left && bytes < least)) {
-      least = bytes, least_left = left, best = clusters;
-    }
-  }
-  if (counts.back() != best) look_at(best, kTuned - kEach, kTuned);
+  weights_ = std::move(best->weights);
+  report_.clusters = best->clusters;
+  report_.inertia = std::move(best->inertia);
+  look_at_pilots(kPilots, part(kSearched, kTuned));
 }
 
 // Of the file, with the vectors and the threshold chosen.
@@ -415,11 +423,10 @@ CompressReport Compressor::run() {
   const bool reachable = options_.basis == 0 && tuning_.basis_error(0, most_) <= options_.error;
   double aim = options_.error;
   for (int left = kAims; left > 0; --left) {
-    choose_vectors(aim);
+    choose_vectors(left == 1 && reachable ? 0 : aim);
     set_tints();
-    // What vectors cannot reach is left; else it is the last try that may leave too much, and the
-    // one in which nothing is left out any more.
-    if (write(!reachable || left == 1 || (cut_ == 0 && threshold_ == 0))) break;
+    // What vectors cannot reach is left. The last try leaves out nothing.
+    if (write(!reachable || left == 1)) break;
     aim *= std::min(0.95, 0.97 * options_.error / report_.measured_error);
   }
   return std::move(report_);

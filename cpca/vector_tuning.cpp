@@ -34,12 +34,19 @@ void VectorTuning::clear() {
   std::fill(energy_.begin(), energy_.end(), 0.0);
 }
 
-void VectorTuning::add(const ClusterBasis& basis, std::size_t vertices, std::vector<double> sigma) {
+void VectorTuning::add(Cluster cluster) {
+  if (cluster.count == 0) return;
+  for (std::size_t l = 0; l < energy_.size(); ++l) energy_[l] += cluster.left[0][l];
+  clusters_.push_back(std::move(cluster));
+}
+
+VectorTuning::Cluster VectorTuning::measured(const ClusterBasis& basis, std::size_t vertices,
+                                             std::vector<double> sigma) const {
   Cluster c;
   c.count = basis.count;
   c.sigma = std::move(sigma);
   const std::size_t lights = lightings_.size(), columns = lightings_.front().size();
-  if (basis.count == 0) return;
+  if (basis.count == 0) return c;
   const std::size_t size = basis.vector.size() / basis.count, parts = size / columns;
 
   // Sums of vectors under each lighting, whole and by the level at which their entries fall out.
@@ -92,7 +99,6 @@ void VectorTuning::add(const ClusterBasis& basis, std::size_t vertices, std::vec
     for (std::size_t v = 0; v < vertices; ++v) {
       for (std::size_t p = 0; p < parts; ++p) {
         double rest = static_cast<double>(basis.exact[(l * vertices + v) * parts + p]);
-        energy_[l] += share * rest * rest;
         c.left[0][l] += share * rest * rest;
         std::fill(lost.begin(), lost.end(), 0.0);
         for (std::size_t i = 0; i < basis.count; ++i) {
@@ -109,13 +115,12 @@ void VectorTuning::add(const ClusterBasis& basis, std::size_t vertices, std::vec
       }
     }
   }
-  clusters_.push_back(std::move(c));
+  return c;
 }
 
 VectorTuning::Kept VectorTuning::kept(double cut, std::size_t most, float threshold) const {
   Kept kept;
   for (const Cluster& c : clusters_) {
-    if (c.count == 0) continue;
     const std::size_t s = chosen(c, cut, most);
     kept.vectors += static_cast<double>(s);
     for (int t = 0; t <= kLevels; ++t) {

@@ -15,11 +15,25 @@ class VectorTuning {
  public:
   explicit VectorTuning(const std::vector<std::vector<float>>& lightings);
 
+  /// What is kept of one cluster.
+  struct Cluster {
+    std::size_t count = 0;      ///< vectors
+    std::vector<double> sigma;  ///< estimated
+    /// Squared error left by the first s vectors, [s][lighting]; [0] is what is to be shown.
+    std::vector<std::vector<double>> left;
+    /// Squared error of leaving out entries below threshold level t, [s][t][lighting].
+    std::vector<std::vector<std::vector<double>>> dropped;
+    /// Entries of the first s vectors that fall out at level t, [s][t].
+    std::vector<std::vector<double>> entries;
+  };
+  /// Measures a cluster of `vertices` vertices by its basis, as wide as any choice, and its
+  /// estimated singular values. May be called from several threads at once.
+  Cluster measured(const ClusterBasis& basis, std::size_t vertices,
+                   std::vector<double> sigma) const;
+
   /// Forgets all clusters.
   void clear();
-  /// Adds a cluster of `vertices` vertices, its basis as wide as any choice, and its estimated
-  /// singular values.
-  void add(const ClusterBasis& basis, std::size_t vertices, std::vector<double> sigma);
+  void add(Cluster cluster);
 
   /// Largest relative picture error over the lightings if each cluster has the vectors whose
   /// singular value is at least `cut`, at most `most`.
@@ -39,16 +53,6 @@ class VectorTuning {
   Kept kept(double cut, std::size_t most, float threshold) const;
 
  private:
-  struct Cluster {
-    std::size_t count = 0;      // vectors
-    std::vector<double> sigma;  // estimated
-    // Squared error left by the first s vectors, [s][lighting], and what is to be shown.
-    std::vector<std::vector<double>> left;
-    // Squared error of leaving out entries below threshold level t, [s][t][lighting].
-    std::vector<std::vector<std::vector<double>>> dropped;
-    // Entries of the first s vectors that fall out at level t, [s][t].
-    std::vector<std::vector<double>> entries;
-  };
   std::size_t chosen(const Cluster& cluster, double cut, std::size_t most) const;
   double worst(const std::vector<double>& error) const;
 

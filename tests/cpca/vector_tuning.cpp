@@ -67,10 +67,10 @@ TEST(VectorTuning, GreyClustersWeighAsThreeChannels) {
   const auto lightings = two_lightings();
   const std::vector<double> sigma{1, 0.3, 0.1};
   VectorTuning grey(lightings), rgb(lightings);
-  grey.add(basis(1, 0.02, lightings, 1), kVertices, sigma);
-  rgb.add(basis(3, 0.02, lightings, 1), kVertices, sigma);
+  grey.add(grey.measured(basis(1, 0.02, lightings, 1), kVertices, sigma));
+  rgb.add(rgb.measured(basis(3, 0.02, lightings, 1), kVertices, sigma));
   for (VectorTuning* tuning : {&grey, &rgb}) {
-    tuning->add(basis(3, 0, lightings, 2), kVertices, sigma);
+    tuning->add(tuning->measured(basis(3, 0, lightings, 2), kVertices, sigma));
   }
   for (const double cut : {0.05, 0.2, 0.5}) {
     const double error = rgb.basis_error(cut, kVectors);
@@ -84,7 +84,7 @@ TEST(VectorTuning, KeptAreTheEntriesAboveTheThreshold) {
   const auto lightings = two_lightings();
   VectorTuning tuning(lightings);
   const ClusterBasis b = basis(1, 0, lightings, 3);
-  tuning.add(b, kVertices, {1, 0.3, 0.1});
+  tuning.add(tuning.measured(b, kVertices, {1, 0.3, 0.1}));
   const VectorTuning::Kept all = tuning.kept(0, kVectors, 0);
   EXPECT_EQ(all.vectors, kVectors);
   EXPECT_EQ(all.entries, kVectors * kColumns);  // none of them is exactly 0
