@@ -77,6 +77,8 @@ struct Pictures {
   std::vector<std::filesystem::path> transports;
   std::vector<std::string> environments;
   int width = 320, height = 200, samples = 64;
+  int bounces = 10'000;  // of the reference
+  int light_face = 0;    // of the reference's light; 0: the transports'
   double degrees = 40;
 };
 
@@ -104,14 +106,19 @@ void compare_pictures(const Pictures& p) {
   camera.width = p.width, camera.height = p.height;
   const Vec3 middle = bounding_sphere(*first.mesh).center;
   std::filesystem::create_directories(p.folder);
-  fmt::print("environment,view,terms,relative_rmse,reference_noise\n");
+  fmt::print("environment,view,transport,terms,relative_rmse,reference_noise\n");
   for (const std::string& file : p.environments) {
     const std::string name = std::filesystem::path(file).stem().string();
     const Environment environment = load_environment(file);
     MotionOptions still;
     still.kind = MotionKind::still;
     Motion motion(still, transports.front().layout(), environment);
-    const reference::Sky sky(motion.cubemap(0));
+    Cubemap map = motion.cubemap(0);
+    if (p.light_face > 0) {
+      map = Cubemap(p.light_face);
+      EnvironmentSampler(environment, p.light_face).project(rotation_y(0), map);
+    }
+    const reference::Sky sky(map);
     const std::vector<Rgb> light(motion.coefficients(0).begin(), motion.coefficients(0).end());
     std::optional<double> exposure;  // of the light, whatever the view
     for (int view = 0; view < 3; ++view) {
@@ -119,14 +126,15 @@ void compare_pictures(const Pictures& p) {
       const std::string stem = fmt::format("{}_{}", name, view);
       reference::PathOptions options;
       options.samples = p.samples;
+      options.max_bounces = p.bounces;
       const auto truth = reference::PathTracer(scene, sky, options).picture(from);
       const Image of_truth = reference::picture_of(truth, from.width, from.height);
       if (!exposure) exposure = auto_exposure_ev(of_truth);
       save_display(p.folder / (stem + "_reference.png"), of_truth, *exposure);
-      for (const Transport& transport : transports) {
-        const Image shown = relight_picture_once(transport, light, from);
-        const int terms = transport.info().terms;
-        save_display(p.folder / fmt::format("{}_terms{}.png", stem, terms), shown, *exposure);
+      for (std::size_t t = 0; t < transports.size(); ++t) {
+        const Image shown = relight_picture_once(transports[t], light, from);
+        const std::string of = p.transports[t].stem().string();
+        save_display(p.folder / fmt::format("{}_{}.png", stem, of), shown, *exposure);
         double difference = 0, noise = 0, energy = 0;
         for (std::size_t i = 0; i < truth.size(); ++i) {
           difference += square(RgbD(shown.pixels[i]) - truth[i].mean);
@@ -135,7 +143,7 @@ void compare_pictures(const Pictures& p) {
         }
         // Noise of the reference adds to the difference, and to the energy.
         energy = std::max(energy - noise, 1e-30);
-        fmt::print("{},{},{},{:.4f},{:.4f}\n", name, view, terms,
+        fmt::print("{},{},{},{},{:.4f},{:.4f}\n", name, view, of, transports[t].info().terms,
                    std::sqrt(std::max(0.0, difference - noise) / energy),
                    std::sqrt(noise / energy));
         std::fflush(stdout);
@@ -160,6 +168,12 @@ int run(int argc, char** argv) {
   pictures->add_option("--height", p.height)->check(CLI::Range(1, 4096));
   pictures->add_option("--samples", p.samples, "paths a pixel")->check(CLI::Range(2, 1 << 20));
   pictures->add_option("--degrees", p.degrees, "between views");
+  pictures->add_option("--bounces", p.bounces, "of the reference, 0: direct light")
+      ->check(CLI::Range(0, 10'000));
+  pictures
+      ->add_option("--light-face", p.light_face,
+                   "texels along a face of the reference's light; 0: as the transports'")
+      ->check(CLI::Range(0, 1024));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -2,13 +2,15 @@
 """Factored BRDFs: error against the number of terms, and pictures of the street against a path tracer.
 
   bench/view.py OUT_DIR --env A.exr --env B.exr [--bin build/bin] [--terms 4 16] [--samples 64]
-                [--noise 0.02] [--paths 2048] [--width 320] [--height 200] [--images docs/images]
+                [--noise 0.02] [--paths 2048] [--width 320] [--height 200] [--split]
+                [--images docs/images]
 
 Writes OUT_DIR/curve.csv and curve.png (relative L2 error of a BRDF over both hemispheres against K),
 makes haarlight-data's street with each number of terms, and writes pictures.csv: the relative RMSE of
 its pictures under both lights from three views against a path tracer that shares no code with
 precomputation, the tracer's noise taken off. strip.png has the views with few terms, with many, and the
-reference. With --images both pictures are copied there as view_curve.png and view_strip.png.
+reference. --split tells where the errors come from: split.csv has pictures of direct light alone, with few and many
+terms, with the street's own vertices and with finer ones, and those under a light of 6x128x128. With --images both pictures are copied there as view_curve.png and view_strip.png.
 What OUT_DIR holds already is kept; start in an empty folder when the program has changed.
 Needs numpy and matplotlib (Debian: python3-numpy, python3-matplotlib).
 """
@@ -75,7 +77,7 @@ def draw_strip(folder, lights, terms, picture):
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    names = [f"terms{k}" for k in terms] + ["reference"]
+    names = [f"street{k}" for k in terms] + ["reference"]
     titles = [f"K = {k}" for k in terms] + ["path traced"]
     cells = [(light, view) for light in lights for view in range(3)]
     first = plt.imread(folder / f"{cells[0][0]}_0_reference.png")
@@ -96,6 +98,42 @@ def draw_strip(folder, lights, terms, picture):
     figure.savefig(picture)
 
 
+MANY = 16  # terms
+
+
+def split(options, out, scene):
+    """Pictures of direct light, one thing after the other made better."""
+    few = min(options.terms)
+    made = {"few": (few, "off"), "many": (MANY, "off"), "fine": (MANY, "auto")}
+    transports = {}
+    for name, (terms, subdivide) in made.items():
+        transports[name] = out / f"direct_{name}.hlt"
+        if not transports[name].exists():
+            run([options.bin / "haarlight", "precompute", scene, "-o", transports[name], "--vertices",
+                 "--subdivide", subdivide, "--max-vertices", 400000, "--face", FACE, "--terms", terms,
+                 "--effects", "shadows,gloss"])
+
+    def compare(name, *more):
+        table = out / f"split_{name}.csv"
+        if not table.exists():
+            run([options.bin / "haarlight-bench-view", "pictures", scene, *transports.values(), "-o", out / name,
+                 "--width", options.width, "--height", options.height, "--samples", options.samples,
+                 "--bounces", 0, "--env", *options.env, *more], table)
+        errors = {}
+        for row in rows_of(table):
+            errors.setdefault((row["environment"], row["transport"]), []).append(float(row["relative_rmse"]))
+        return {key: (sum(e * e for e in errors_) / len(errors_)) ** 0.5 for key, errors_ in errors.items()}
+
+    same, sharp = compare("same"), compare("sharp", "--light-face", 128)
+    print("\n| direct light: relative RMSE over three views | " + " | ".join(Path(e).stem for e in options.env) + " |")
+    print("| --- |" + " --- |" * len(options.env))
+    for title, errors, name in ((f"K = {few}", same, "few"), (f"K = {MANY}", same, "many"),
+                                (f"K = {MANY}, finer vertices", same, "fine"),
+                                (f"the last, against light of 6x128x128", sharp, "fine")):
+        cells = [f"{100 * errors[(Path(e).stem, f'direct_{name}')]:.1f} %" for e in options.env]
+        print(f"| {title} | " + " | ".join(cells) + " |")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
@@ -107,6 +145,7 @@ def main():
     parser.add_argument("--paths", type=int, default=2048, help="of haarlight precompute")
     parser.add_argument("--width", type=int, default=320)
     parser.add_argument("--height", type=int, default=200)
+    parser.add_argument("--split", action="store_true", help="where the errors come from")
     parser.add_argument("--images", type=Path, help="folder for copies of the pictures")
     options = parser.parse_args()
     out = options.out
@@ -157,6 +196,9 @@ def main():
             print(f"| {light} | {view} | {errors} | {100 * float(rows[0]['reference_noise']):.1f} % |")
         lights = [Path(e).stem for e in options.env]
         draw_strip(out, lights, options.terms, out / "strip.png")
+
+        if options.split:
+            split(options, out, scene)
 
     if options.images:
         shutil.copy(out / "curve.png", options.images / "view_curve.png")

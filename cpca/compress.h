@@ -14,8 +14,9 @@
 namespace haarlight {
 
 struct CompressOptions {
-  int clusters = 0;        ///< 1 to vertices; 0: of one per 50, 100, 200 or 400 vertices what makes
-                           ///< the smallest file, by an estimate from a few clusters of each
+  int clusters = 0;        ///< 1 to vertices; 0: of one per 400, 200, 100 or 50 vertices the fewest
+                           ///< whose file is within 5 % of the smallest, by an estimate from a few
+                           ///< clusters of each; where none reaches `error`, what comes nearest
   int basis = 0;           ///< vectors a cluster, 1 to 256; 0: by `error`, each cluster its own
   double error = 0.01;     ///< relative picture error, > 0 and < 1. Without a basis the file's
                            ///< measured_error is no larger: it is written anew until it is, five

@@ -144,6 +144,45 @@ TEST(Sketch, KeepsDistances) {
   set_thread_count(threads);
 }
 
+// Vertices of so many terms lie in more than one chunk: their points have one owner at a time, and
+// are sums over all of their rows.
+TEST(Sketch, OfVerticesWithManyTermsIsTheSumOverTheirRows) {
+  constexpr int kTerms = 200, kDims = 64;
+  const Transport transport =
+      build(fixtures::small_mesh_transport(2, fixtures::bumpy_sphere(120, 3), 3, kTerms));
+  ASSERT_GT(transport.chunk_count(), 4);
+  const VertexRows rows(transport);
+  const int threads = thread_count();
+  set_thread_count(1);
+  const Sketch one = sketch_rows(rows, kDims, 1, {});
+  set_thread_count(7);
+  for (int run = 0; run < 5; ++run) {
+    EXPECT_EQ(sketch_rows(rows, kDims, 1, {}).value, one.value) << "run " << run;
+  }
+  set_thread_count(threads);
+  // |p|^2 is |x|^2 in the mean; over 100 vertices whose rows differ, within 4 standard deviations.
+  const auto vertices = first_vertices(100);
+  const Eigen::MatrixXd x = matrix_of(rows, vertices, 3);
+  double mean = 0;
+  for (std::size_t v = 0; v < 100; ++v) {
+    double size = 0;
+    for (int i = 0; i < kDims; ++i) {
+      size += static_cast<double>(one.point(v)[i]) * static_cast<double>(one.point(v)[i]);
+    }
+    double right = 0;
+    for (int k = 0; k < kTerms; ++k) {
+      const auto tint = rows.tint(v, k);
+      const auto part = x.row(static_cast<Eigen::Index>(v)).segment(k * 3 * 24, 3 * 24);
+      right += tint == Rgb{1, 1, 1}
+                   ? part.squaredNorm()
+                   : 3 * part.head(24).squaredNorm() /
+                         (static_cast<double>(tint.r) * static_cast<double>(tint.r));
+    }
+    mean += size / right / 100;
+  }
+  EXPECT_NEAR(mean, 1, 4 * std::sqrt(2.0 / kDims / 100));
+}
+
 TEST(ClusterBasis, IsTheBestOfItsLength) {
   const Transport transport = build(fixtures::smooth_transport(8, 150, 2, false));
   const VertexRows rows(transport);

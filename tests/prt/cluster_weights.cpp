@@ -3,12 +3,18 @@
 #include "prt/cluster_weights.h"
 
 #include <gtest/gtest.h>
+#include <xxhash.h>
 
+#include <cstring>
 #include <limits>
 #include <random>
+#include <span>
+#include <string>
 
 #include "core/error.h"
 #include "prt/picture_relighter.h"
+#include "prt/transport_format.h"
+#include "prt/transport_tables.h"
 #include "prt/transport_writer.h"
 #include "tests/prt/fixtures.h"
 
@@ -118,6 +124,124 @@ TEST(ClusterWeights, FilesKeepThem) {
   for (std::uint32_t o = 0; o < 20; ++o) EXPECT_EQ(file.row_output()[o], o);
   EXPECT_EQ(file.row_output()[20], kNoOutput);
   EXPECT_THROW(PictureRelighter{file}, Error);
+}
+
+// Files whose checksums are right and whose content is not.
+class CraftedClusters : public testing::Test {
+ protected:
+  CraftedClusters() {
+    auto small = fixtures::small_mesh_transport(2, fixtures::bumpy_sphere(100, 17), 17, 2);
+    vertices_ = static_cast<std::uint32_t>(small.info.mesh->position.size());
+    small.info.kind = TransportKind::clusters;
+    small.info.view =
+        std::make_shared<const ViewFactors>(fixtures::random_view_factors(vertices_, 2, 17));
+    small.info.clusters = std::make_shared<const ClusterWeights>(some_weights(vertices_, 8, 2));
+    TransportWriter writer(folder_ / "a.hlt", small.info, {small.thresholds, "test", false});
+    small.tiles[0].color.assign(small.tiles[0].color.size(), Rgb{1, 1, 1});
+    writer.write_tile(0, small.tiles[0]);
+    writer.finish("{}");
+    bytes_ = read_bytes(folder_ / "a.hlt");
+    std::memcpy(&header_, bytes_.data(), sizeof header_);
+  }
+  std::string section(const FileSection& s) const { return bytes_.substr(s.offset, s.size); }
+  // The file with `content` at its end, of which the header tells by `place`.
+  std::string opened_with(const std::string& content, const auto& place) const {
+    std::string bytes = bytes_;
+    TransportHeader header = header_;
+    const FileSection put{bytes.size(), content.size(),
+                          XXH3_64bits(content.data(), content.size())};
+    bytes += content;
+    place(header, put, bytes);
+    header.file_size = bytes.size();
+    header.header_hash = XXH3_64bits(&header, offsetof(TransportHeader, header_hash));
+    std::memcpy(bytes.data(), &header, sizeof header);
+    write_bytes(folder_ / "b.hlt", bytes);
+    try {
+      const Transport file = Transport::open(folder_ / "b.hlt");
+      return file.info().clusters && file.info().view ? "" : "opened without";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::format);
+      return error.what();
+    }
+  }
+  // Opened with this as the section of that name.
+  std::string opened_with_section(const char* name, const std::string& content) const {
+    return opened_with(
+        content, [&](TransportHeader& header, const FileSection& put, std::string& bytes) {
+          std::string table = section(header_.named);
+          for (std::size_t at = 0; at < table.size(); at += sizeof(NamedSection)) {
+            if (std::memcmp(table.data() + at, name, 8) == 0) {
+              std::memcpy(table.data() + at + 8, &put, sizeof put);
+            }
+          }
+          header.named = {bytes.size(), table.size(), XXH3_64bits(table.data(), table.size())};
+          bytes += table;
+        });
+  }
+  FileSection named(const char* name) const {
+    const std::string table = section(header_.named);
+    FileSection found;
+    for (std::size_t at = 0; at < table.size(); at += sizeof(NamedSection)) {
+      if (std::memcmp(table.data() + at, name, 8) == 0) {
+        std::memcpy(&found, table.data() + at + 8, sizeof found);
+      }
+    }
+    return found;
+  }
+
+  TemporaryFolder folder_;
+  std::uint32_t vertices_ = 0;
+  std::string bytes_;
+  TransportHeader header_{};
+};
+
+TEST_F(CraftedClusters, CountsThatDoNotFitAreRefused) {
+  for (const char* name : {kClustersName, kViewFactorsName}) {
+    const std::string right = section(named(name));
+    ASSERT_FALSE(right.empty());
+    ASSERT_EQ(opened_with_section(name, right), "");
+    const std::string called(name, strnlen(name, 8));
+    const std::size_t counts = name == kClustersName ? 7 : 4;
+    for (std::size_t word = 0; word < counts; ++word) {
+      std::uint32_t value = 0;
+      std::memcpy(&value, right.data() + 4 * word, 4);
+      for (const std::uint32_t bad :
+           {0u, 1u, value - 1, value + 1, 2 * value + 1, 0x7fffffffu, 0x80000000u, 0xffffffffu}) {
+        if (bad == value) continue;
+        std::string content = right;
+        std::memcpy(content.data() + 4 * word, &bad, 4);
+        EXPECT_NE(opened_with_section(name, content), "")
+            << called << ", word " << word << ": " << bad << " in place of " << value;
+      }
+    }
+    for (std::size_t size = 0; size < right.size(); size += 5) {
+      EXPECT_NE(opened_with_section(name, right.substr(0, size)), "") << called << " " << size;
+    }
+  }
+}
+
+// Clusters find their vectors by the number of a row, and have colours at their vertices.
+TEST_F(CraftedClusters, RowsAreInOrderAndWithoutColour) {
+  const std::size_t rows = static_cast<std::size_t>(header_.chunk_count) * kChunkRows;
+  const std::string packed = section(header_.rows);
+  const RowTables right = unpack_tables(std::as_bytes(std::span(packed)), rows, 20, "a");
+  const auto opened = [&](const RowTables& tables) {
+    const std::vector<std::byte> bytes = pack_tables(tables);
+    const std::string content(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    return opened_with(content, [](TransportHeader& header, const FileSection& put, std::string&) {
+      header.rows = put;
+    });
+  };
+  ASSERT_EQ(opened(right), "");
+  RowTables swapped = right;
+  std::swap(swapped.row_output[3], swapped.row_output[4]);
+  EXPECT_NE(opened(swapped).find("row 3 of clusters"), std::string::npos) << opened(swapped);
+  RowTables coloured = right;
+  coloured.row_color[7].g *= 2;
+  EXPECT_NE(opened(coloured).find("row 7 of clusters"), std::string::npos) << opened(coloured);
+  RowTables later = right;
+  later.row_output[19] = kNoOutput, later.row_output[20] = 19;
+  EXPECT_NE(opened(later).find("row 19 of clusters"), std::string::npos) << opened(later);
 }
 
 }  // namespace
