@@ -28,16 +28,16 @@ namespace haarlight {
 namespace {
 
 constexpr int kVerticesPerCluster[] = {400, 200, 100, 50};  // tried where they are ours to choose
-constexpr double kWorthIt = 0.95;  // of the bytes, that more clusters must save
-constexpr double kGivesUp = 1.1;   // of the bytes: no more clusters are tried
-constexpr std::size_t kPilots = 64, kSearchPilots = 24;  // clusters looked at closely
-constexpr int kAims = 5;           // files written at most until the error is what was asked for
-constexpr double kBlockBytes = 6;  // of a stored block beside its 16 entries, about
+constexpr double kWorthIt = 0.95;    // of the bytes, that more clusters must save
+constexpr double kGivesUp = 1.1;     // of the bytes: no more clusters are tried
+constexpr std::size_t kPilots = 64;  // clusters looked at closely
+constexpr int kAims = 5;             // files written at most until the error is what was asked for
+constexpr double kBlockBytes = 6;    // of a stored block beside its 16 entries, about
 constexpr std::size_t kMostByError = 96;  // vectors a cluster, where the error decides
 constexpr int kClusteringBasis = 8;       // axes of a flat while vertices are shared out
 
 // Shares of the whole that steps of the work take.
-constexpr double kSketched = 0.25, kClustered = 0.4, kSearched = 0.46, kTuned = 0.5, kFound = 0.95;
+constexpr double kSketched = 0.25, kClustered = 0.4, kTuned = 0.5, kFound = 0.95;
 
 void check(const CompressOptions& o, std::size_t vertices) {
   const auto refuse = [](const char* what, auto value, const std::string& wanted) {
@@ -78,7 +78,7 @@ class Compressor {
   }
   Progress part(double from, double to) const;
   void share_out(int clusters, const Progress& progress);
-  void look_at_pilots(std::size_t most, const Progress& progress);
+  void look_at_pilots(const Progress& progress);
   void choose_clusters();
   void choose_vectors(double error);
   double estimated_bytes() const;
@@ -145,7 +145,7 @@ void Compressor::share_out(int clusters, const Progress& progress) {
 }
 
 // A few clusters are taken apart as widely as any choice wants them.
-void Compressor::look_at_pilots(std::size_t most, const Progress& progress) {
+void Compressor::look_at_pilots(const Progress& progress) {
   const auto clusters = static_cast<std::size_t>(report_.clusters);
   sigma_.assign(clusters, {});
   parallel_for(static_cast<int>(clusters), [&](int i) {
@@ -153,7 +153,7 @@ void Compressor::look_at_pilots(std::size_t most, const Progress& progress) {
     sigma_[c] = estimated_sizes(sketch_, members(c));
     for (double& s : sigma_[c]) s *= std::sqrt(static_cast<double>(weights_.vertices_of(c)));
   });
-  const std::size_t step = std::max<std::size_t>(1, clusters / most);
+  const std::size_t step = std::max<std::size_t>(1, clusters / kPilots);
   std::vector<std::size_t> pilots;
   for (std::size_t c = step / 2; c < clusters; c += step) pilots.push_back(c);
   // Bases are large: a thread has one at a time.
@@ -172,27 +172,29 @@ void Compressor::look_at_pilots(std::size_t most, const Progress& progress) {
 void Compressor::choose_clusters() {
   if (options_.clusters > 0) {
     share_out(options_.clusters, part(kSketched, kClustered));
-    look_at_pilots(kPilots, part(kClustered, kTuned));
+    look_at_pilots(part(kClustered, kTuned));
     return;
   }
   struct Try {
     ClusterWeights weights;
+    std::vector<std::vector<double>> sigma;
+    VectorTuning tuning;
     int clusters = 0;
     std::vector<double> inertia;
     double bytes = 0, left = 0;
   };
   std::optional<Try> best;
   const auto vertices = static_cast<int>(rows_.vertices());
-  constexpr double kEach = (kSearched - kSketched) / std::size(kVerticesPerCluster);
+  constexpr double kEach = (kTuned - kSketched) / std::size(kVerticesPerCluster);
   double from = kSketched;
   for (const int size : kVerticesPerCluster) {
     const int clusters = std::max(1, vertices / size);
     from += kEach;
     if (best && clusters <= best->clusters) continue;  // few vertices
     share_out(clusters, part(from - kEach, from - 0.3 * kEach));
-    look_at_pilots(kSearchPilots, part(from - 0.3 * kEach, from));
+    look_at_pilots(part(from - 0.3 * kEach, from));
     choose_vectors(options_.error);
-    Try now{weights_, report_.clusters, report_.inertia, estimated_bytes(), 0};
+    Try now{weights_, sigma_, tuning_, report_.clusters, report_.inertia, estimated_bytes(), 0};
     now.left = std::max(report_.basis_error - options_.error, 0.0);
     // Where the error is out of reach, what comes nearest. More clusters take longer to find and
     // to relight: they must be worth it.
@@ -203,9 +205,10 @@ void Compressor::choose_clusters() {
     if (worse) break;
   }
   weights_ = std::move(best->weights);
+  sigma_ = std::move(best->sigma);
+  tuning_ = std::move(best->tuning);
   report_.clusters = best->clusters;
   report_.inertia = std::move(best->inertia);
-  look_at_pilots(kPilots, part(kSearched, kTuned));
 }
 
 // Of the file, with the vectors and the threshold chosen.

@@ -27,7 +27,7 @@ int level_of(float rms) {
 }  // namespace
 
 VectorTuning::VectorTuning(const std::vector<std::vector<float>>& lightings)
-    : lightings_(lightings), energy_(lightings.size(), 0.0) {}
+    : lightings_(&lightings), energy_(lightings.size(), 0.0) {}
 
 void VectorTuning::clear() {
   clusters_.clear();
@@ -45,7 +45,7 @@ VectorTuning::Cluster VectorTuning::measured(const ClusterBasis& basis, std::siz
   Cluster c;
   c.count = basis.count;
   c.sigma = std::move(sigma);
-  const std::size_t lights = lightings_.size(), columns = lightings_.front().size();
+  const std::size_t lights = lightings_->size(), columns = lightings_->front().size();
   if (basis.count == 0) return c;
   const std::size_t size = basis.vector.size() / basis.count, parts = size / columns;
 
@@ -71,7 +71,7 @@ VectorTuning::Cluster VectorTuning::measured(const ClusterBasis& basis, std::siz
           const float b = basis.vector[i * size + p * columns + j];
           ++c.entries[i + 1][level];
           for (std::size_t l = 0; l < lights; ++l) {
-            const float part = b * lightings_[l][j];
+            const float part = b * (*lightings_)[l][j];
             sums[(i * parts + p) * lights + l] += part;
             by_level[((i * parts + p) * lights + l) * (kLevels + 1) + level] += part;
           }

@@ -56,7 +56,7 @@ class VectorTuning {
   std::size_t chosen(const Cluster& cluster, double cut, std::size_t most) const;
   double worst(const std::vector<double>& error) const;
 
-  const std::vector<std::vector<float>>& lightings_;
+  const std::vector<std::vector<float>>* lightings_;
   std::vector<Cluster> clusters_;
   std::vector<double> energy_;  // of the picture, [lighting]
 };
