@@ -97,6 +97,16 @@ TEST(Compress, ReachesTheErrorThatIsAimedAt) {
   }
 }
 
+// Rounding to 8 bits is in no estimate: the first file is not good enough, and is written anew.
+TEST(Compress, WritesAgainUntilTheErrorIsKept) {
+  const TemporaryFolder folder;
+  const Transport transport = build(fixtures::smooth_transport(8, 1500, 1, false));
+  const CompressReport report =
+      compress_transport(transport, folder / "a.hlt", {.clusters = 12, .error = 0.007});
+  EXPECT_LT(report.basis_error, 0.004);
+  EXPECT_LE(report.measured_error, 0.007);
+}
+
 // Where clusters are ours to choose, the file is about as small as the best number tried makes it,
 // and as right as asked for.
 TEST(Compress, ChoosesClustersByTheFilesSize) {
