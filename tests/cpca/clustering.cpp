@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <map>
 #include <random>
 #include <set>
@@ -59,25 +58,6 @@ TEST(Clustering, FindsFlatsThatAreThere) {
   double size = 0;
   for (const float x : points.value) size += static_cast<double>(x) * x;
   EXPECT_LE(found.inertia.back(), 1e-10 * size);
-}
-
-// A quarter of the clusters comes from splits: of what is left where most is, by what differs most
-// in it. Flats take turns, so that halves in any other order hold all flats alike; after two rounds
-// assignments have not yet mended what bad splits do.
-TEST(Clustering, SplitsPartWhatLiesOnDifferentFlats) {
-  for (const std::size_t flats : {12u, 24u}) {
-    const Sketch apart = points_on_flats(static_cast<int>(flats), 1, 30, 0, 6);
-    Sketch points = apart;
-    double size = 0;
-    for (std::size_t i = 0; i < 30 * flats; ++i) {
-      const float* from = apart.point(i % flats * 30 + i / flats);
-      std::copy_n(from, 64, points.value.begin() + static_cast<std::ptrdiff_t>(64 * i));
-    }
-    for (const float x : points.value) size += static_cast<double>(x) * x;
-    const Clustering found = cluster_points(
-        points, {.clusters = static_cast<int>(flats), .basis = 1, .iterations = 2}, {});
-    EXPECT_LE(found.inertia.back(), 1e-10 * size) << flats;
-  }
 }
 
 TEST(Clustering, InertiaNeverRisesAndIsWhatThePointsLeave) {
