@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "apps/caching_options.h"
+#include "apps/instant_options.h"
 #include "apps/option_parsers.h"
 #include "apps/outputs.h"
 #include "apps/progress_printer.h"
@@ -37,6 +38,7 @@ struct AnimateCommand {
   double rate = 25;
   PathPictureOptions picture{512, 512, 64, 1, false, false};
   CachingOptions caching;
+  InstantOptions instant;
   std::optional<double> exposure_ev;
 
   void run() const;
@@ -48,10 +50,19 @@ struct AnimateCommand {
 
 std::unique_ptr<AnimationMethod> AnimateCommand::make(const AnimatedScene& animation) const {
   if (method == "path") return std::make_unique<PathMethod>(animation, picture);
-  CachingOptions options = caching;
+  if (method == "irc" || method == "trc") {
+    CachingOptions options = caching;
+    options.width = picture.width, options.height = picture.height;
+    options.temporal = method == "trc";
+    return std::make_unique<CachingMethod>(animation, options);
+  }
+  InstantOptions options = instant;
   options.width = picture.width, options.height = picture.height;
-  options.temporal = method == "trc";
-  return std::make_unique<CachingMethod>(animation, options);
+  options.kind = method == "direct" ? InstantKind::direct
+                 : method == "igi"  ? InstantKind::igi
+                 : method == "ic"   ? InstantKind::ic
+                                    : InstantKind::tic;
+  return std::make_unique<InstantMethod>(animation, options);
 }
 
 void AnimateCommand::save(int number, const FramePicture& frame, double exposure) const {
@@ -111,9 +122,17 @@ Verb add_animate(CLI::App& verb) {
   AnimateCommand& c = *command;
   add_path(verb, "SCENE", c.scene, "SCENE.gltf", "animated glTF scene, .gltf or .glb")->required();
   add_choice<std::string>(verb, "--method", c.method,
-                          {{"path", "path"}, {"irc", "irc"}, {"trc", "trc"}},
+                          {{"path", "path"},
+                           {"irc", "irc"},
+                           {"trc", "trc"},
+                           {"direct", "direct"},
+                           {"igi", "igi"},
+                           {"ic", "ic"},
+                           {"tic", "tic"}},
                           "path: path tracing, all bounces; irc: irradiance caching, anew every "
-                          "frame; trc: temporal radiance caching");
+                          "frame; trc: temporal radiance caching; by virtual lights: igi: instant "
+                          "global illumination, ic: instant caching, anew every frame; tic: "
+                          "temporal instant caching; direct: none but direct light");
   add_path(verb, "--env", c.env, "FILE",
            "a picture behind everything, EXR or HDR, in place of the scene's");
   add_number(verb, "--env-turn", c.env_turn, -1e6, 1e6, "turn of --env about +Y, degrees");
@@ -130,6 +149,7 @@ Verb add_animate(CLI::App& verb) {
   add_choice<bool>(verb, "--noise", c.picture.frozen, {{"fresh", false}, {"frozen", true}},
                    "path: frozen: the same random numbers in every frame");
   add_caching_options(verb, c.caching);
+  add_instant_options(verb, c.instant);
   verb.add_option_function<std::string>(
           "--size",
           [&c](const std::string& text) {
@@ -154,7 +174,13 @@ Verb add_animate(CLI::App& verb) {
            "one row a frame: frame, method, triangles, and what the method reports: path: build_ms "
            "(scene and ray tracer), render_ms; irc, trc: records_new, records_replaced, "
            "records_alive, rays (of hemispheres), build_ms, update_ms (of records, by the clock), "
-           "hemisphere_ms and reproject_ms (parts of it, summed over threads), render_ms");
+           "hemisphere_ms and reproject_ms (parts of it, summed over threads), render_ms; direct, "
+           "igi, ic, tic: build_ms (scene and ray tracer), direct_ms (rays of the camera, direct "
+           "light, lobes), lights_ms, update_ms (of the cache), gather_ms (new records and "
+           "interpolation), diffuse_ms (the last three), total_ms; numbers of lights and records; "
+           "rays (shadow rays through the whole scene), rays_moving (through what moves alone), "
+           "rays_saved (known from the frame before), bounded (share of light that --min-distance "
+           "took)");
   add_threads(verb);
   verb.footer(
       "\nMoves: nodes, morph targets, cameras, lights (KHR_lights_punctual), and the numbers of\n"

@@ -148,16 +148,29 @@ struct Buffer {
   Buffer& operator=(const Buffer&) = delete;
 };
 
+// One device for all parts of scenes, which come and go every frame: a device of its own costs more
+// than a small part does.
+RTCDevice device_of_parts() {
+  struct Shared {
+    RTCDevice device = rtcNewDevice(nullptr);
+    ~Shared() {
+      if (device) rtcReleaseDevice(device);
+    }
+  };
+  static const Shared shared;
+  if (shared.device) rtcRetainDevice(shared.device);
+  return shared.device;
+}
+
 }  // namespace
 
-Visibility::Visibility(const Scene& scene) : device_(std::make_unique<Device>()) {
-  triangle_count_ = scene.triangle.size();
-  if (triangle_count_ == 0) {
+Visibility::LocalFrame Visibility::local_frame(const Scene& scene) {
+  if (scene.triangle.empty()) {
     throw Error(ErrorKind::missing,
                 fmt::format("{}: no triangles, expected at least one", scene.name));
   }
 
-  // The local frame: only vertices that triangles use may shape it.
+  // Only vertices that triangles use may shape it.
   constexpr double kMax = std::numeric_limits<double>::max();
   Vec3 low{kMax, kMax, kMax}, high{-kMax, -kMax, -kMax};
   for (const Triangle& t : scene.triangle) {
@@ -167,8 +180,9 @@ Visibility::Visibility(const Scene& scene) : device_(std::make_unique<Device>())
       high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
     }
   }
-  center_ = (low + high) * 0.5;
-  const Vec3 half = high - center_;
+  LocalFrame frame;
+  frame.center = (low + high) * 0.5;
+  const Vec3 half = high - frame.center;
   const double largest = std::max({half.x, half.y, half.z});
   if (!(largest > 0) || !std::isfinite(largest)) {
     throw Error(ErrorKind::format, fmt::format("{}: bounding box half width is {}, expected a "
@@ -177,9 +191,31 @@ Visibility::Visibility(const Scene& scene) : device_(std::make_unique<Device>())
   }
   int exponent = 0;
   std::frexp(largest, &exponent);  // largest in [2^(e-1), 2^e)
-  scale_ = std::ldexp(1.0, 1 - exponent);
+  frame.scale = std::ldexp(1.0, 1 - exponent);
+  return frame;
+}
 
-  device_->device = rtcNewDevice(nullptr);
+Visibility::Visibility(const Scene& scene) : device_(std::make_unique<Device>()) {
+  const LocalFrame frame = local_frame(scene);
+  center_ = frame.center, scale_ = frame.scale;
+  build(scene, nullptr);
+}
+
+Visibility::Visibility(const Scene& scene, const LocalFrame& frame,
+                       std::span<const std::uint32_t> triangles)
+    : device_(std::make_unique<Device>()), center_(frame.center), scale_(frame.scale) {
+  const std::vector<std::uint32_t> part(triangles.begin(), triangles.end());
+  if (part.empty()) {
+    throw Error(ErrorKind::missing,
+                fmt::format("{}: a part without triangles, expected at least one", scene.name));
+  }
+  build(scene, &part);
+}
+
+void Visibility::build(const Scene& scene, const std::vector<std::uint32_t>* part) {
+  triangle_count_ = part ? part->size() : scene.triangle.size();
+  const auto number = [&](std::size_t i) { return part ? (*part)[i] : i; };
+  device_->device = part ? device_of_parts() : rtcNewDevice(nullptr);
   if (!device_->device) {
     throw Error(ErrorKind::io, fmt::format("Embree gives no device (error {}), expected one",
                                            static_cast<int>(rtcGetDeviceError(nullptr))));
@@ -188,7 +224,9 @@ Visibility::Visibility(const Scene& scene) : device_(std::make_unique<Device>())
       rtcGetDeviceProperty(device_->device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) != 0;
 
   std::array<std::size_t, kinds> count{};
-  for (const Triangle& t : scene.triangle) ++count[kind_of(scene.material[t.material])];
+  for (std::size_t i = 0; i < triangle_count_; ++i) {
+    ++count[kind_of(scene.material[scene.triangle[number(i)].material])];
+  }
   has_specular_ = count[specular] + count[specular_holed] > 0;
   // Lobes are looked for to have less noise: without masks they are found by chance.
   const bool masks =
@@ -205,10 +243,22 @@ Visibility::Visibility(const Scene& scene) : device_(std::make_unique<Device>())
   for (std::size_t k = 1; k < kinds; ++k) {
     device_->first[k] = device_->first[k - 1] + static_cast<std::uint32_t>(count[k - 1]);
   }
-  const bool mixed = std::count(count.begin(), count.end(), triangle_count_) == 0;
+  const bool mixed = part || std::count(count.begin(), count.end(), triangle_count_) == 0;
+  // A part takes the vertices it names, which lie beside each other if it is one body.
+  std::size_t first_vertex = 0, vertices = scene.position.size();
+  if (part) {
+    std::size_t end = 0;
+    first_vertex = vertices;
+    for (const std::uint32_t t : *part) {
+      for (const std::size_t v : scene.triangle[t].vertex) {
+        first_vertex = std::min(first_vertex, v), end = std::max(end, v + 1);
+      }
+    }
+    vertices = end - first_vertex;
+  }
 
   device_->scene = rtcNewScene(device_->device);
-  const Buffer positions(device_->device, 3 * sizeof(float) * scene.position.size());
+  const Buffer positions(device_->device, 3 * sizeof(float) * vertices);
   const Buffer indices(device_->device, 3 * sizeof(std::uint32_t) * triangle_count_);
   if (!positions.data || !indices.data || !device_->scene) {
     device_->check(fmt::format("{}: {} triangles", scene.name, triangle_count_));
@@ -216,21 +266,25 @@ Visibility::Visibility(const Scene& scene) : device_(std::make_unique<Device>())
                                            triangle_count_));
   }
   auto* position = static_cast<float*>(positions.data);
-  for (std::size_t v = 0; v < scene.position.size(); ++v) {
-    const Vec3 p = to_local(scene.position[v]);
+  for (std::size_t v = 0; v < vertices; ++v) {
+    const Vec3 p = to_local(scene.position[first_vertex + v]);
     position[3 * v] = static_cast<float>(p.x);
     position[3 * v + 1] = static_cast<float>(p.y);
     position[3 * v + 2] = static_cast<float>(p.z);
   }
   auto* index = static_cast<std::uint32_t*>(indices.data);
-  if (mixed)
-    device_->triangle_at.resize(triangle_count_), device_->place_of.resize(triangle_count_);
+  if (mixed) {
+    device_->triangle_at.resize(triangle_count_), device_->place_of.resize(scene.triangle.size());
+  }
   std::array<std::uint32_t, kinds> next = device_->first;
-  for (std::size_t t = 0; t < triangle_count_; ++t) {
+  for (std::size_t i = 0; i < triangle_count_; ++i) {
+    const std::size_t t = number(i);
     const Triangle& triangle = scene.triangle[t];
     const Kind kind = kind_of(scene.material[triangle.material]);
     const std::size_t place = next[kind]++;
-    for (std::size_t c = 0; c < 3; ++c) index[3 * place + c] = triangle.vertex[c];
+    for (std::size_t c = 0; c < 3; ++c) {
+      index[3 * place + c] = triangle.vertex[c] - static_cast<std::uint32_t>(first_vertex);
+    }
     if (is_holed(kind)) device_->holes[kind].add(scene, triangle);
     if (!mixed) continue;
     device_->triangle_at[place] = static_cast<std::uint32_t>(t);
@@ -242,7 +296,7 @@ Visibility::Visibility(const Scene& scene) : device_(std::make_unique<Device>())
     if (count[k] == 0) continue;
     RTCGeometry geometry = rtcNewGeometry(device_->device, RTC_GEOMETRY_TYPE_TRIANGLE);
     rtcSetGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, positions.buffer,
-                         0, 3 * sizeof(float), scene.position.size());
+                         0, 3 * sizeof(float), vertices);
     rtcSetGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, indices.buffer,
                          3 * sizeof(std::uint32_t) * device_->first[k], 3 * sizeof(std::uint32_t),
                          count[k]);
@@ -258,7 +312,7 @@ Visibility::Visibility(const Scene& scene) : device_(std::make_unique<Device>())
   }
   // Robust: no ray slips between triangles that share an edge.
   rtcSetSceneFlags(device_->scene, RTC_SCENE_FLAG_ROBUST);
-  rtcSetSceneBuildQuality(device_->scene, RTC_BUILD_QUALITY_HIGH);
+  rtcSetSceneBuildQuality(device_->scene, part ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
   rtcCommitScene(device_->scene);
   device_->check(fmt::format("{}: {} triangles", scene.name, triangle_count_));
 }

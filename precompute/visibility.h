@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "core/vec.h"
 #include "precompute/scene.h"
@@ -33,6 +35,18 @@ class Visibility {
 
   /// Throws Error{missing} for a scene without triangles, Error{io} if Embree refuses.
   explicit Visibility(const Scene& scene);
+  /// Where local coordinates lie: local = (world - center) * scale.
+  struct LocalFrame {
+    Vec3 center;
+    double scale = 1;
+  };
+  /// The frame that the constructor above takes. Throws as it does.
+  static LocalFrame local_frame(const Scene& scene);
+  /// Some triangles of a scene in a frame that is given, largest coordinates below 2: what moves
+  /// apart from what does not. Hits and corners() bear the numbers of the scene. Built fast, and
+  /// without splitting triangles: whether a ray meets a triangle does not depend on the others, so
+  /// that single rays through the parts of a scene find what they find in the whole, bit by bit.
+  Visibility(const Scene& scene, const LocalFrame& frame, std::span<const std::uint32_t> triangles);
   ~Visibility();
   Visibility(const Visibility&) = delete;
   Visibility& operator=(const Visibility&) = delete;
@@ -84,6 +98,7 @@ class Visibility {
 
  private:
   struct Device;
+  void build(const Scene& scene, const std::vector<std::uint32_t>* part);
   unsigned trace8(const std::array<float, 3>& origin, const float* x, const float* y,
                   const float* z, unsigned lanes, float distance, Surfaces seen) const;
   std::unique_ptr<Device> device_;

@@ -25,7 +25,7 @@ haarlight_hard_test(determinism SOURCES determinism USES haarlight_precompute ha
   XxHash::XxHash)
 haarlight_hard_test(clusters SOURCES clusters USES haarlight_cpca)
 haarlight_hard_test(factors SOURCES factors USES haarlight_precompute)
-haarlight_hard_test(caching SOURCES caching USES haarlight_caching)
+haarlight_hard_test(caching SOURCES caching instant_caching USES haarlight_caching)
 
 haarlight_hard_test(files SOURCES files_damage USES haarlight_fuzz_targets XxHash::XxHash)
 haarlight_hard_test(models SOURCES files_models USES haarlight_fuzz_targets XxHash::XxHash)
