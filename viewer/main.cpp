@@ -17,6 +17,7 @@
 #include "core/parallel.h"
 #include "viewer/headless.h"
 #include "viewer/run_options.h"
+#include "viewer/scene_run.h"
 #ifdef HAARLIGHT_WINDOW
 #include "viewer/show.h"
 #endif
@@ -60,14 +61,16 @@ struct CommandLine {
   RunOptions run;
   bool headless = false, no_memory = false;
   double milliseconds = 0, error = 0, scale = 0;
-  std::string exposure = "auto", tonemap = "filmic", size;
+  std::string exposure = "auto", tonemap = "filmic", size, picture;
   int threads = 0;
+  SceneRunOptions scene;  // what a scene that moves needs beside that
 };
 
 void add_options(CLI::App& app, CommandLine& c) {
   RunOptions& r = c.run;
   ViewSettings& s = r.settings;
-  app.add_option("FILE", r.transport, "transport file (.hlt) to open");
+  app.add_option("FILE", r.transport,
+                 "transport file (.hlt) to open, or a scene that moves (.gltf, .glb)");
   app.add_option("--env", r.env, "environment, EXR or HDR");
   app.add_option("--env-to", r.env_to, "second environment, to blend to");
   add_words<MotionKind>(app, "--motion", s.motion,
@@ -124,6 +127,20 @@ void add_options(CLI::App& app, CommandLine& c) {
   app.add_option("--exr", r.exr, "radiance of the last frame (headless)");
   app.add_option("--record", r.record, "write the motion as JSON for haarlight relight --motion");
   app.add_option("--metrics", r.metrics, "one row a frame, as haarlight relight's");
+  // A scene that moves.
+  add_words<SceneMethod>(
+      app, "--renderer", c.scene.settings.method,
+      {{"path", SceneMethod::path}, {"irc", SceneMethod::irc}, {"trc", SceneMethod::trc}},
+      "of a scene that moves: path tracing, irradiance caching or temporal radiance caching "
+      "[path]");
+  app.add_option("--spp", c.scene.settings.samples, "path: paths a pixel in one picture [1]")
+      ->check(CLI::Range(1, 4096));
+  app.add_option("--picture", c.picture, "of a scene that moves, WIDTHxHEIGHT [600x400]");
+  app.add_option("--first", c.scene.settings.first, "frame that a scene begins with [0]")
+      ->check(CLI::Range(0, 1'000'000));
+  app.add_option("--pause-at", c.scene.pause_at,
+                 "frame that a scene stops at with --frames; paths go on to be added there")
+      ->check(CLI::Range(0, 1'000'000));
   app.add_flag("--timings", r.timings, "print medians: light, relight, upload, gui, milliseconds");
   app.add_flag("--headless", c.headless,
                "no window; the same where there is no display and --frames is given");
@@ -134,6 +151,15 @@ void add_options(CLI::App& app, CommandLine& c) {
   app.add_option("--script", r.script, "play keys, clicks and drags from a file");
   app.add_flag("--no-memory", c.no_memory, "neither read nor write preferences");
   app.add_option("--threads", c.threads, "that relight [all]")->check(CLI::Range(1, 1024));
+}
+
+void read_size(const std::string& name, const std::string& text, int& width, int& height) {
+  if (text.empty()) return;
+  char rest = 0;
+  if (std::sscanf(text.c_str(), "%dx%d%c", &width, &height, &rest) != 2 || width < 1 ||
+      height < 1 || width > 16384 || height > 16384) {
+    throw CLI::ValidationError(name, "'" + text + "', expected WIDTHxHEIGHT");
+  }
 }
 
 void finish_options(CommandLine& c) {
@@ -160,13 +186,13 @@ void finish_options(CommandLine& c) {
             : c.tonemap == "reinhard" ? TonemapCurve::reinhard
                                       : TonemapCurve::filmic;
   r.width = r.height = 0;
-  if (!c.size.empty()) {
-    char rest = 0;
-    if (std::sscanf(c.size.c_str(), "%dx%d%c", &r.width, &r.height, &rest) != 2 || r.width < 1 ||
-        r.height < 1 || r.width > 16384 || r.height > 16384) {
-      throw CLI::ValidationError("--size", "'" + c.size + "', expected WIDTHxHEIGHT");
-    }
-  }
+  read_size("--size", c.size, r.width, r.height);
+  SceneRunOptions& s = c.scene;
+  read_size("--picture", c.picture, s.settings.width, s.settings.height);
+  s.settings.env = r.env;
+  s.scene = r.transport, s.frames = r.frames;
+  s.exposure_ev = r.exposure_ev, s.curve = r.curve;
+  s.screenshot = r.screenshot, s.exr = r.exr, s.metrics = r.metrics;
   r.remember = !c.no_memory;
   if (c.threads > 0) set_thread_count(c.threads);
   if (r.frames > 0) {
@@ -191,7 +217,11 @@ int run(CommandLine& c) {
     if (c.run.frames == 0) {
       return fail(kWrongCommandLine, "--headless has no end, expected --frames N");
     }
-    lines = run_headless(c.run);
+    if (is_scene_file(c.run.transport)) {
+      run_scene_headless(c.scene);
+    } else {
+      lines = run_headless(c.run);
+    }
   } else {
 #ifdef HAARLIGHT_WINDOW
     if (!has_display()) {
@@ -199,7 +229,13 @@ int run(CommandLine& c) {
                   "there is no display (DISPLAY is not set), expected one, or --frames N to run "
                   "without");
     }
-    lines = show(c.run, c.scale);
+    if (is_scene_file(c.run.transport)) {
+      constexpr int kWidth = 1200, kHeight = 800;
+      show_scene(c.scene, c.run.width > 0 ? c.run.width : kWidth,
+                 c.run.height > 0 ? c.run.height : kHeight, c.scale);
+    } else {
+      lines = show(c.run, c.scale);
+    }
 #else
     return fail(kStatedError, "this program was built without a window, expected --frames N");
 #endif
@@ -222,6 +258,7 @@ int main(int argc, char** argv) {
       "Exit codes: 0 done; 1 a stated error, in one line; 2 a wrong command line.\n\n"
       "Examples:\n"
       "  haarlight-view bunny.hlt --env lobby.exr\n"
+      "  haarlight-view spheres.glb --renderer path\n"
       "  haarlight-view bunny.hlt --env lobby.exr --frames 120 --screenshot p.png --motion rotate");
   CommandLine command;
   add_options(app, command);

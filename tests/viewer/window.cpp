@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/image_io.h"
+#include "data_gen/animations.h"
 #include "tests/apps/inputs.h"
 #include "tests/apps/program_runner.h"
 #include "tests/viewer/inputs.h"
@@ -281,6 +282,32 @@ TEST_F(ViewWindow, SaysWhichLineOfAScriptFailed) {
   const ProgramResult result = show("wait 2\nclick nothing of that name\n");
   EXPECT_EQ(result.code, 1);
   EXPECT_NE(result.err.find("line 2"), std::string::npos) << result.err;
+}
+
+TEST_F(ViewWindow, PlaysASceneThatMoves) {
+  data_gen::save_animation(folder_ / "box.glb", "cube-in-box");
+  const ProgramResult result =
+      run_with_display({"-a", "-s", "-screen 0 1600x1200x24", HAARLIGHT_VIEW, "box.glb", "--frames",
+                        "12", "--pause-at", "2", "--picture", "96x72", "--size", "480x360", "--spp",
+                        "4", "--exr", "box.exr", "--screenshot", "box.png"},
+                       folder_.path());
+  ASSERT_EQ(result.code, 0) << result.err;
+  // The picture fills the window: the same shape. What the panel, top left, does not cover is what
+  // the session has, but for its tonemapping: red on the left, green on the right, as bright below.
+  const Image shot = load_image(folder_ / "box.png"), radiance = load_image(folder_ / "box.exr");
+  ASSERT_EQ(shot.width, 480);
+  ASSERT_EQ(radiance.width, 96);
+  const auto patch = [](const Image& image, int column) {  // of 8 x 6 boxes, the row above the last
+    const std::vector<double> all = boxes(image, 8, 6);
+    const auto at = all.begin() + 3 * (4 * 8 + column);
+    return std::vector<double>(at, at + 3);
+  };
+  for (const int column : {0, 7}) {
+    const std::vector<double> shown = patch(shot, column), sent = patch(radiance, column);
+    const std::size_t wall = column == 0 ? 0 : 1;
+    EXPECT_GT(shown[wall], 1.5 * shown[1 - wall]) << column;
+    EXPECT_GT(sent[wall], 1.5 * sent[1 - wall]) << column;
+  }
 }
 
 }  // namespace

@@ -1,0 +1,181 @@
+// Scenes that move, played and taken hold of, without a window.
+
+#include "viewer/scene_session.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <optional>
+
+#include "caching/path_picture.h"
+#include "core/error.h"
+#include "core/image_io.h"
+#include "data_gen/animations.h"
+#include "viewer/scene_run.h"
+
+namespace haarlight::viewer {
+namespace {
+
+std::filesystem::path scratch(const std::string& name) {
+  const auto folder = std::filesystem::temp_directory_path() /
+                      ("haarlight-scene-session-" + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  return folder / name;
+}
+
+std::filesystem::path scene_file(const std::string& name) {
+  const auto file = scratch(name + ".glb");
+  data_gen::save_animation(file, name);
+  return file;
+}
+
+const SceneSettings kSmall{24, 18, SceneMethod::path, 2, 0, {}};
+
+double difference(const Image& a, const Image& b) {
+  double sum = 0, of = 0;
+  for (std::size_t i = 0; i < a.pixels.size(); ++i) {
+    sum += l1_norm(RgbD(a.pixels[i]) - RgbD(b.pixels[i])), of += l1_norm(RgbD(b.pixels[i]));
+  }
+  return sum / of;
+}
+
+TEST(SceneSession, PlaysStepsAndGoesRound) {
+  SceneSession session(scene_file("cube-in-box"), kSmall);
+  EXPECT_EQ(session.frames(), 401);
+  EXPECT_TRUE(session.advance());
+  EXPECT_EQ(session.frame(), 0);
+  session.play(true);
+  EXPECT_TRUE(session.advance());
+  EXPECT_TRUE(session.advance());
+  EXPECT_EQ(session.frame(), 2);
+  EXPECT_EQ(session.samples(), 2);  // paths of another frame do not count
+  session.step(-3);
+  EXPECT_FALSE(session.playing());
+  EXPECT_EQ(session.frame(), 400);
+  session.play(true);
+  EXPECT_TRUE(session.advance());
+  EXPECT_EQ(session.frame(), 0);
+}
+
+TEST(SceneSession, PathsAddUpWhileItRests) {
+  const auto file = scene_file("cube-in-box");
+  SceneSession session(file, kSmall);
+  for (int i = 0; i < 8; ++i) EXPECT_TRUE(session.advance());
+  EXPECT_EQ(session.samples(), 16);
+  // The mean of as many pictures by the seeds 1, 3, ..., 15, within a float's rounding.
+  const AnimatedScene scene(file);
+  const AnimatedFrame frame = scene.at(0);
+  const FrameTracer tracer(frame);
+  std::vector<RgbD> sum(session.picture().pixels.size());
+  for (std::uint64_t seed = 1; seed < 16; seed += 2) {
+    const Image one = path_picture(tracer, {24, 18, 2, seed});
+    for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += RgbD(one.pixels[i]) * (1.0 / 8);
+  }
+  for (std::size_t i = 0; i < sum.size(); ++i) {
+    const RgbD off = RgbD(session.picture().pixels[i]) - sum[i];
+    EXPECT_LT(l1_norm(off), 1e-6 * (1 + l1_norm(sum[i])));
+  }
+}
+
+TEST(SceneSession, WhatIsTakenHoldOfFollowsThePointer) {
+  SceneSession session(scene_file("moving-light"), kSmall);
+  session.advance();
+  // The cube's middle at (0.1, 0.25, -0.4) is seen from (0, 1, 0.97) right and below of the middle.
+  const AnimatedScene scene(scratch("moving-light.glb"));
+  const AnimatedFrame frame = scene.at(0);
+  const Camera camera = frame_camera(frame, 24, 18);
+  const auto pixel = [&](const Vec3& world) {
+    const Vec3 p = camera.orientation.transposed() * (world - camera.position);
+    const double scale = 9 / std::tan(0.5 * camera.vertical_fov) / -p.z;
+    return std::array{12 + p.x * scale, 9 - p.y * scale};
+  };
+  const auto at = pixel({0.1, 0.25, -0.4});
+  // A lamp is nearer than ten pixels to everything here: its own picture is larger.
+  SceneSettings large = kSmall;
+  large.width = 240, large.height = 180, large.samples = 1;
+  SceneSession big(scratch("moving-light.glb"), large);
+  big.advance();
+  const auto held = big.grab(10 * at[0], 10 * at[1]);
+  ASSERT_TRUE(held);
+  EXPECT_FALSE(held->lamp);
+  const Image before = big.picture();
+  big.drag(*held, 10 * at[0] - 40, 10 * at[1]);
+  EXPECT_TRUE(big.advance());
+  EXPECT_EQ(big.samples(), 1);  // it begins anew
+  EXPECT_GT(difference(big.picture(), before), 0.05);
+  // It is there now, and no longer where it was.
+  const auto again = big.grab(10 * at[0] - 40, 10 * at[1]);
+  ASSERT_TRUE(again);
+  EXPECT_EQ(again->node, held->node);
+  EXPECT_LT(length(again->point - held->point - again->before), 0.02);
+  EXPECT_NE(again->before, Vec3());
+  // The lamp stands at (0, 1.7, 0.5) in frame 0; it is dragged to the left.
+  const auto lamps = big.lamps_seen();
+  ASSERT_EQ(lamps.size(), 1u);
+  const auto lamp = big.grab(lamps[0][0] + 2, lamps[0][1] - 3);
+  ASSERT_TRUE(lamp);
+  EXPECT_TRUE(lamp->lamp);
+  big.drag(*lamp, lamps[0][0] - 50, lamps[0][1]);
+  big.advance();
+  EXPECT_NEAR(big.lamps_seen()[0][0], lamps[0][0] - 50, 1e-6);
+  EXPECT_NEAR(big.lamps_seen()[0][1], lamps[0][1], 1e-6);
+  // Walls are all around, and nobody's to carry.
+  EXPECT_FALSE(big.grab(2, 90));
+}
+
+TEST(SceneSession, TheCameraTurnsAboutWhatIsInTheMiddle) {
+  SceneSettings settings{64, 48, SceneMethod::path, 1, 0, {}};
+  SceneSession session(scene_file("cube-in-box"), settings);
+  session.advance();
+  const Image before = session.picture();
+  session.orbit(0.3, 0.1, 0.2);
+  EXPECT_TRUE(session.advance());
+  EXPECT_GT(difference(session.picture(), before), 0.05);
+  session.orbit(-0.3, -0.1, -0.2);
+  session.advance();
+  session.orbit(0, 0, 0);
+  session.advance();
+  EXPECT_LT(difference(session.picture(), before), 1e-6);  // the same paths
+}
+
+TEST(SceneSession, CachesDrawTheSameSceneAndThenRest) {
+  const auto file = scene_file("cube-in-box");
+  SceneSession truth(file, {24, 18, SceneMethod::path, 256, 0, {}});
+  truth.advance();
+  for (const SceneMethod method : {SceneMethod::irc, SceneMethod::trc}) {
+    SceneSession session(file, {24, 18, method, 1, 0, {}});
+    EXPECT_TRUE(session.advance());
+    // Paths are spread over pixels, records asked for at their middles: edges of this small
+    // picture are off by a few percent; a picture without its indirect light would be by 40.
+    EXPECT_LT(difference(session.picture(), truth.picture()), 0.15);
+    EXPECT_FALSE(session.advance());
+    session.set_method(SceneMethod::path);
+    EXPECT_TRUE(session.advance());
+    EXPECT_EQ(session.samples(), 1);
+  }
+}
+
+TEST(SceneSession, RunsWithoutAWindow) {
+  SceneRunOptions options;
+  options.scene = scene_file("moving-light");
+  options.settings = kSmall;
+  options.frames = 6, options.pause_at = 2;
+  options.exr = scratch("last.exr"), options.screenshot = scratch("last.png");
+  run_scene_headless(options);
+  const Image last = load_image(options.exr);
+  // Frames 0, 1 and 2, and three pictures more of that: what a session that begins there has.
+  SceneSettings there = kSmall;
+  there.first = 2;
+  SceneSession session(options.scene, there);
+  for (int i = 0; i < 4; ++i) session.advance();
+  EXPECT_EQ(last.pixels, session.picture().pixels);
+  EXPECT_EQ(load_image(options.screenshot).width, 24);
+  EXPECT_TRUE(is_scene_file("a.gltf"));
+  EXPECT_FALSE(is_scene_file("a.hlt"));
+  EXPECT_THROW(SceneSession(scratch("none.glb"), kSmall), Error);
+}
+
+}  // namespace
+}  // namespace haarlight::viewer

@@ -1,0 +1,191 @@
+// The window of a scene that moves.
+
+#include <epoxy/gl.h>
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/image_io.h"
+#include "viewer/scene_run.h"
+#include "viewer/texture.h"
+#include "viewer/window.h"
+
+namespace haarlight::viewer {
+namespace {
+
+constexpr const char* kMethods[] = {"path tracing", "irradiance caching",
+                                    "temporal radiance caching"};
+
+std::vector<std::uint8_t> bytes_of(const Image& radiance, TonemapCurve curve, double exposure) {
+  const Image shown = tonemap(radiance, {curve, exposure});
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(4 * shown.pixels.size());
+  for (const Rgb& c : shown.pixels) {
+    for (const float x : {c.r, c.g, c.b}) {
+      const double v = std::clamp(static_cast<double>(x), 0.0, 1.0);
+      const double coded = v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055;
+      bytes.push_back(static_cast<std::uint8_t>(std::lround(255 * coded)));
+    }
+    bytes.push_back(255);
+  }
+  return bytes;
+}
+
+// Where the picture lies in the window, and which of its pixels is at a place there.
+struct Place {
+  ImVec2 corner, size;
+  double scale = 1;  // units of the window a pixel
+  double x(float at) const { return static_cast<double>(at - corner.x) / scale; }
+  double y(float at) const { return static_cast<double>(at - corner.y) / scale; }
+};
+
+Place place_of(const Image& picture) {
+  const ImVec2 all = ImGui::GetIO().DisplaySize;
+  const double scale = std::min(static_cast<double>(all.x) / picture.width,
+                                static_cast<double>(all.y) / picture.height);
+  const ImVec2 size(static_cast<float>(scale * picture.width),
+                    static_cast<float>(scale * picture.height));
+  return {ImVec2((all.x - size.x) / 2, (all.y - size.y) / 2), size, scale};
+}
+
+class SceneInterface {
+ public:
+  SceneInterface(SceneSession& session, double exposure) : session_(session), exposure_(exposure) {}
+
+  double exposure() const { return exposure_; }
+
+  // Whether something was asked for that changes how the picture is shown.
+  bool take_input(const Place& place) {
+    const ImGuiIO& io = ImGui::GetIO();
+    bool reshow = false;
+    if (!io.WantCaptureKeyboard) {
+      if (ImGui::IsKeyPressed(GLFW_KEY_SPACE, false)) session_.play(!session_.playing());
+      if (ImGui::IsKeyPressed(GLFW_KEY_PERIOD)) session_.step(1);
+      if (ImGui::IsKeyPressed(GLFW_KEY_COMMA)) session_.step(-1);
+      if (ImGui::IsKeyPressed(GLFW_KEY_M, false)) {
+        session_.set_method(
+            static_cast<SceneMethod>((static_cast<int>(session_.method()) + 1) % 3));
+      }
+      for (const auto& [key, change] : {std::pair{GLFW_KEY_EQUAL, 0.25}, {GLFW_KEY_MINUS, -0.25}}) {
+        if (!ImGui::IsKeyPressed(key)) continue;
+        exposure_ += change, reshow = true;
+      }
+    }
+    if (io.WantCaptureMouse) return reshow;
+    const double x = place.x(io.MousePos.x), y = place.y(io.MousePos.y);
+    const bool moved = io.MouseDelta.x != 0 || io.MouseDelta.y != 0;
+    const bool by_hand = ImGui::IsMouseDown(1) || (io.KeyShift && ImGui::IsMouseDown(0));
+    if (by_hand && !held_ && (ImGui::IsMouseClicked(1) || ImGui::IsMouseClicked(0))) {
+      held_ = session_.grab(x, y);
+    }
+    if (!by_hand) held_.reset();
+    if (by_hand && held_ && moved) session_.drag(*held_, x, y);
+    constexpr double kTurn = 0.006;  // radians a unit of the window
+    if (!by_hand && ImGui::IsMouseDown(0) && moved) {
+      session_.orbit(-kTurn * static_cast<double>(io.MouseDelta.x),
+                     kTurn * static_cast<double>(io.MouseDelta.y), 0);
+    }
+    if (io.MouseWheel != 0) session_.orbit(0, 0, 0.1 * static_cast<double>(io.MouseWheel));
+    return reshow;
+  }
+
+  void draw(const Place& place, const Texture& texture) {
+    ImDrawList& under = *ImGui::GetBackgroundDrawList();
+    const ImVec2 end(place.corner.x + place.size.x, place.corner.y + place.size.y);
+    under.AddImage(reinterpret_cast<ImTextureID>(static_cast<std::intptr_t>(texture.id())),
+                   place.corner, end);
+    for (const auto& [x, y] : session_.lamps_seen()) {
+      const ImVec2 at(place.corner.x + static_cast<float>(x * place.scale),
+                      place.corner.y + static_cast<float>(y * place.scale));
+      under.AddCircle(at, 6, IM_COL32(255, 220, 90, 200), 16, 1.5f);
+    }
+    ImGui::SetNextWindowPos(ImVec2(10, 10), ImGuiCond_FirstUseEver);
+    ImGui::Begin("Scene", nullptr, ImGuiWindowFlags_AlwaysAutoResize);
+    if (ImGui::Button(session_.playing() ? "Pause" : "Play")) session_.play(!session_.playing());
+    ImGui::SameLine();
+    if (ImGui::Button("Back")) session_.step(-1);
+    ImGui::SameLine();
+    if (ImGui::Button("Step")) session_.step(1);
+    int method = static_cast<int>(session_.method());
+    if (ImGui::Combo("##method", &method, kMethods, 3)) {
+      session_.set_method(static_cast<SceneMethod>(method));
+    }
+    int frame = session_.frame();
+    if (ImGui::SliderInt("frame", &frame, 0, std::max(session_.frames() - 1, 1))) {
+      session_.step(frame - session_.frame());
+    }
+    const std::string line = session_.samples() > 0
+                                 ? fmt::format("{} triangles, {} paths a pixel",
+                                               session_.triangles(), session_.samples())
+                                 : fmt::format("{} triangles", session_.triangles());
+    ImGui::TextUnformatted(line.c_str());
+    ImGui::TextDisabled("drag: turn; right drag: move body or lamp; wheel: closer");
+    ImGui::End();
+  }
+
+ private:
+  SceneSession& session_;
+  double exposure_;
+  std::optional<SceneSession::Grab> held_;
+};
+
+}  // namespace
+
+void show_scene(const SceneRunOptions& options, int width, int height, double scale) {
+  SceneSession session(options.scene, options.settings);
+  session.advance();
+  Window window(width, height, scale);
+  Texture texture;
+  SceneInterface interface(session,
+                           options.exposure_ev.value_or(auto_exposure_ev(session.picture())));
+  session.play(options.frames > 0);
+  bool reshow = true;
+  int pictures = 1;
+  while (!glfwWindowShouldClose(window.handle())) {
+    glfwPollEvents();
+    int pixels_wide = 0, pixels_high = 0;
+    window.framebuffer(pixels_wide, pixels_high);
+    if (pixels_wide < 1 || pixels_high < 1) {
+      glfwWaitEventsTimeout(0.1);  // iconified
+      continue;
+    }
+    if (reshow) {
+      const Image& picture = session.picture();
+      texture.fill_rgba(picture.width, picture.height,
+                        bytes_of(picture, options.curve, interface.exposure()));
+    }
+    window.begin_frame({});
+    const Place place = place_of(session.picture());
+    reshow = interface.take_input(place);
+    interface.draw(place, texture);
+    glViewport(0, 0, pixels_wide, pixels_high);
+    glClearColor(0.055f, 0.058f, 0.063f, 1);
+    glClear(GL_COLOR_BUFFER_BIT);
+    window.end_frame();
+    const bool last = options.frames > 0 && pictures >= options.frames;
+    if (last && !options.screenshot.empty()) {
+      save_image(options.screenshot, window.read_pixels(0, 0, pixels_wide, pixels_high));
+    }
+    window.show();
+    if (last) break;
+    if (session.frame() == options.pause_at) session.play(false);
+    if (session.advance()) {
+      reshow = true, ++pictures;
+    } else if (options.frames > 0) {
+      ++pictures;  // it is as good as it gets
+    } else {
+      glfwWaitEventsTimeout(0.1);
+    }
+  }
+  if (!options.exr.empty()) save_image(options.exr, session.picture());
+}
+
+}  // namespace haarlight::viewer
