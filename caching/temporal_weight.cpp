@@ -29,23 +29,17 @@ double temporal_ratio(const RgbD& now, const RgbD& next) {
 }
 
 double temporal_ratio(std::span<const float> now, std::span<const float> next) {
-  constexpr double kFloor = 0.1;
-  double largest = 0;
+  double largest_now = 0, largest_next = 0, change = 0;
   for (std::size_t i = 0; i < now.size(); ++i) {
-    const double a = std::abs(static_cast<double>(now[i]));
-    const double b = std::abs(static_cast<double>(next[i]));
+    const auto a = static_cast<double>(now[i]), b = static_cast<double>(next[i]);
     if (!std::isfinite(a) || !std::isfinite(b)) return kMostRatio;
-    largest = std::max({largest, a, b});
+    largest_now = std::max(largest_now, std::abs(a));
+    largest_next = std::max(largest_next, std::abs(b));
+    change = std::max(change, std::abs(b - a));
   }
-  if (largest == 0) return 1;
-  // Coefficients have signs: the change is compared with the size.
-  double most = 1;
-  for (std::size_t i = 0; i < now.size(); ++i) {
-    const double a = static_cast<double>(now[i]), b = static_cast<double>(next[i]);
-    const double size = std::max({std::min(std::abs(a), std::abs(b)), kFloor * largest});
-    most = std::max(most, 1 + std::abs(b - a) / size);
-  }
-  return std::min(most, kMostRatio);
+  if (change == 0) return 1;
+  const double size = std::min(largest_now, largest_next);
+  return size * kMostRatio > change ? std::min(1 + change / size, kMostRatio) : kMostRatio;
 }
 
 double temporal_weight(double ratio, int age) {

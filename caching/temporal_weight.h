@@ -21,8 +21,10 @@ struct TemporalAccuracy {
 inline constexpr double kMostRatio = 1e6;
 double temporal_ratio(const RgbD& now, const RgbD& next);
 
-/// The same for coefficients of incoming radiance (equation 21), the floor being a tenth of the
-/// largest: any single small coefficient would end the record.
+/// The same for coefficients of incoming radiance: 1 plus the largest change of any, as a share of
+/// the largest coefficient. Equation 21 takes each as a share of itself; but coefficients have
+/// signs, any may be near 0 and would end the record, and what a picture shows of a change is in
+/// proportion to the largest, not to the one that changes.
 double temporal_ratio(std::span<const float> now, std::span<const float> next);
 
 /// 1 / ((ratio - 1) age) for a record that is `age` frames old (equation 9), capped at

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <set>
+#include <span>
+#include <vector>
 
 #include "caching/hemisphere.h"
 #include "caching/record_cache.h"
@@ -220,6 +222,19 @@ TEST(TemporalWeight, LivesAsLongAsItsChangeAllows) {
   EXPECT_NEAR(temporal_weight(1.25, 2), 2, 1e-12);
 }
 
+TEST(TemporalWeight, CoefficientsAreComparedWithTheLargest) {
+  const std::vector<float> now{2, 0, -0.5f}, fades{1, 0, -0.25f}, turns{2, 0.5f, 0.5f},
+      none{0, 0, 0};
+  EXPECT_EQ(temporal_ratio(std::span<const float>(now), now), 1);
+  EXPECT_NEAR(temporal_ratio(std::span<const float>(now), fades), 2, 1e-6);  // both ways
+  EXPECT_NEAR(temporal_ratio(std::span<const float>(fades), now), 2, 1e-6);
+  EXPECT_NEAR(temporal_ratio(std::span<const float>(now), turns), 1.5, 1e-6);
+  EXPECT_EQ(temporal_ratio(std::span<const float>(now), none), kMostRatio);
+  EXPECT_EQ(temporal_ratio(std::span<const float>(none), none), 1);
+  const std::vector<float> odd{std::numeric_limits<float>::quiet_NaN(), 0, 0};
+  EXPECT_EQ(temporal_ratio(std::span<const float>(now), odd), kMostRatio);
+}
+
 // A floor and a wall of next to no albedo under a lamp: what a place on the floor gets is the
 // lamp's light off the wall, in closed form at every direction.
 AnimatedFrame wall_frame(const Vec3& lamp, double wall_x) {
@@ -287,6 +302,48 @@ TEST(Reprojection, MovedWallIsSeenWhereItWillBe) {
   EXPECT_GT(std::abs(before - wanted), 0.05 * wanted);
   EXPECT_LT(std::abs(found - wanted), 0.25 * std::abs(before - wanted));
   EXPECT_GT(report.moved, 0);
+}
+
+TEST(Reprojection, HolesGetTheLightOfTheirDeepestNeighbour) {
+  // Under a sky of 1 a black board leaves, from beside another one: where it was, the sky is what
+  // is seen next to it wherever sky is next to it, and not the board that stays.
+  Scene scene = shapes::empty_scene();
+  shapes::add_quad(scene, {-3, 0, 3}, {6, 0, 0}, {0, 0, -6});
+  scene.material[0].albedo = {0, 0, 0};
+  AnimatedFrame now;
+  now.emission.resize(1), now.background = {1, 1, 1};
+  shapes::add_quad(scene, {0, 1, -0.5}, {0.6, 0, 0}, {0, 0, 1});
+  shapes::add_quad(scene, {-0.6, 1, -0.5}, {0.6, 0, 0}, {0, 0, 1});
+  now.scene = scene;
+  AnimatedFrame next = now;
+  for (std::size_t v = 4; v < 8; ++v) next.scene.position[v].y = -5;
+  const BodyPlace place{0, 0.25, 0.25, true};
+  Hemisphere h = stratified_hemisphere(1000, 1);
+  std::vector<SeenPlace> seen;
+  irradiance_in(now, place, h, &seen);
+  ReprojectionReport report;
+  const Hemisphere found = reprojected(h, seen, place, FrameChange(now, next), &report);
+  int holes = 0, torn = 0;
+  for (int j = 0; j < h.rings; ++j) {
+    for (int k = 0; k < h.sectors; ++k) {
+      const auto triangle_at = [&](int ring, int sector) {
+        return seen[h.number(ring, (sector + h.sectors) % h.sectors)].place.triangle;
+      };
+      if (const auto t = triangle_at(j, k); t != 2 && t != 3) continue;
+      ++holes;
+      bool sky = false, board = false;
+      for (int a = std::max(j - 1, 0); a <= std::min(j + 1, h.rings - 1); ++a) {
+        for (int b = k - 1; b <= k + 1; ++b) {
+          sky = sky || triangle_at(a, b) == SeenPlace::kBackground;
+          board = board || triangle_at(a, b) == 4 || triangle_at(a, b) == 5;
+        }
+      }
+      EXPECT_TRUE(!sky || found.radiance[h.number(j, k)].g == 1) << j << ", " << k;
+      torn += sky && board;
+    }
+  }
+  EXPECT_EQ(report.holes, holes);
+  EXPECT_GT(torn, 0);
 }
 
 TEST(Reprojection, PlaceOnABodyThatTurnsWithAllElseSeesTheSame) {
