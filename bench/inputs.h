@@ -26,6 +26,7 @@ struct Inputs {
 Inputs& inputs();
 
 void register_kernels();
+void register_cpca_kernels();
 void register_memory();
 void register_decide();
 void register_relight();

@@ -29,6 +29,7 @@ int run(const std::string& transport, const std::string& environment, const std:
   Inputs& in = inputs();
   register_memory();
   register_kernels();
+  register_cpca_kernels();
   if (!transport.empty()) {
     in.transport = Transport::open(transport);
     const Environment light = load_environment(environment);
@@ -77,7 +78,9 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Measures relighting and ray tracing, and prints ratios to the machine's own limits.\n"
       "All --benchmark_* flags of Google Benchmark work; --benchmark_filter=REGEX picks cases:\n"
-      "memory.read, haar.*, topk.*, apply.grey.*, apply.rgb.*, finish.*, sh.*, judge, raster.*, "
+      "memory.read, machine.gaps, haar.*, topk.*, apply.grey.*, apply.rgb.*, finish.*, sh.*, "
+      "judge, raster.*, "
+      "cpca.*, "
       "decide.*, apply.*, frame.*, sums.* (with --transport), rays.* (with --scene), "
       "light.*, "
       "run.*"};

@@ -2,6 +2,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include <chrono>
 #include <cstdint>
 #include <vector>
 
@@ -43,9 +44,45 @@ void read(benchmark::State& state) {
                           static_cast<std::int64_t>(words * 8));
 }
 
+// Threads that do nothing but read the clock, for 0.2 s: what lies between two readings was taken
+// away, by the system or whatever else the machine is busy with.
+void gaps(benchmark::State& state) {
+  using Clock = std::chrono::steady_clock;
+  const auto ms = [](Clock::duration d) {
+    return std::chrono::duration<double, std::milli>(d).count();
+  };
+  const int threads = thread_count();
+  std::vector<double> lost(static_cast<std::size_t>(threads)), long_ones(lost.size());
+  std::vector<double> spun(lost.size());
+  for (auto _ : state) {
+    parallel_for(threads, [&](int i) {
+      const auto k = static_cast<std::size_t>(i);
+      const Clock::time_point begin = Clock::now();
+      Clock::time_point last = begin;
+      while (ms(last - begin) < 200) {
+        const Clock::time_point now = Clock::now();
+        const double gap = ms(now - last);
+        if (gap > 0.1) lost[k] += gap;
+        if (gap > 0.4) ++long_ones[k];
+        last = now;
+      }
+      spun[k] += ms(last - begin);
+    });
+  }
+  double all_lost = 0, all_long = 0, all = 0;
+  for (std::size_t k = 0; k < lost.size(); ++k) {
+    all_lost += lost[k], all_long += long_ones[k], all += spun[k];
+  }
+  if (!(all >= 200.0 * static_cast<double>(threads))) state.SkipWithError("it did not spin");
+  state.counters["lost_percent"] = 100 * all_lost / all;
+  // Of a frame of 4 ms on all threads, the chance that some thread loses 0.4 ms at once.
+  state.counters["frames_hit_percent"] = 100 * all_long * 4 * threads / all;
+}
+
 }  // namespace
 
 void register_memory() {
+  benchmark::RegisterBenchmark("machine.gaps", gaps)->Unit(benchmark::kMillisecond)->UseRealTime();
   benchmark::RegisterBenchmark("memory.read", read)->Unit(benchmark::kMillisecond)->UseRealTime();
 }
 

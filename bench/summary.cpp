@@ -26,18 +26,27 @@ const Collector::Case* Collector::find(const std::string& name) const {
 void Collector::print_summary() const {
   fmt::print("\nRatios (medians of this run)\n");
   const Case* read = find("memory.read");
-  for (const char* name : {"apply.bi.k30", "apply.pbi.k30", "apply.nwa.k30", "apply.reference"}) {
-    const Case* apply = find(name);
-    if (!apply || !read) continue;
-    const double share =
-        apply->counters.at("bytes_per_second") / read->counters.at("bytes_per_second");
-    const double transport =
-        apply->counters.at("transport_bytes_per_second") / read->counters.at("bytes_per_second");
+  for (const auto& [name, entry] : median_) {
+    const auto bytes = entry.counters.find("bytes_per_second");
+    if (!read || &entry == read || bytes == entry.counters.end()) continue;
+    const double whole = read->counters.at("bytes_per_second");
+    fmt::print("  {:<18} {:8.3f} ms, {:5.1f} GB/s, {:.0f} % of the read bandwidth of {:.1f} GB/s",
+               name, entry.milliseconds, bytes->second / 1e9, 100 * bytes->second / whole,
+               whole / 1e9);
+    const auto moved = entry.counters.find("MB");
+    if (moved != entry.counters.end()) fmt::print(", {:.3f} MB", moved->second);
+    const auto transport = entry.counters.find("transport_bytes_per_second");
+    if (transport != entry.counters.end()) {
+      fmt::print(" (transport alone {:.0f} %)", 100 * transport->second / whole);
+    }
+    fmt::print("\n");
+  }
+  if (const Case* gaps = find("machine.gaps")) {
     fmt::print(
-        "  {:<18} {:5.1f} GB/s, {:.0f} % of the read bandwidth of {:.1f} GB/s "
-        "(transport alone {:.0f} %)\n",
-        name, apply->counters.at("bytes_per_second") / 1e9, 100 * share,
-        read->counters.at("bytes_per_second") / 1e9, 100 * transport);
+        "  spinning threads lose {:.2f} % of their time in gaps above 0.1 ms; {:.2f} % of 4 ms "
+        "frames "
+        "meet one above 0.4 ms\n",
+        gaps->counters.at("lost_percent"), gaps->counters.at("frames_hit_percent"));
   }
   const Case* pbi = find("frame.pbi.k30");
   const Case* nwa = find("frame.nwa.k30");

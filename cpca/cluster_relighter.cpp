@@ -172,12 +172,7 @@ RelightStats ClusterRelighter::apply(const LightingUpdate& update) {
 }
 
 void ClusterRelighter::expect_resets(bool expected) { state_->vectors.expect_resets(expected); }
-double ClusterRelighter::reset_bytes(int band) const {
-  return static_cast<double>(state_->vectors.reset_bytes(band));
-}
-double ClusterRelighter::fold_bytes() const {
-  return static_cast<double>(state_->vectors.fold_bytes());
-}
+const RowSums* ClusterRelighter::row_sums() const { return &state_->vectors; }
 void ClusterRelighter::set_exact(bool exact) { state_->exact = exact; }
 bool ClusterRelighter::settled() const { return state_->vertices.settled(); }
 const Camera& ClusterRelighter::camera() const { return state_->camera; }

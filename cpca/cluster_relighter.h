@@ -33,8 +33,7 @@ class ClusterRelighter final : public Relighter {
   const Camera& camera() const override;
   RelightStats apply(const LightingUpdate& update) override;
   void expect_resets(bool expected) override;
-  double reset_bytes(int band) const override;
-  double fold_bytes() const override;
+  const RowSums* row_sums() const override;
   void set_exact(bool exact) override;
   bool settled() const override;
   const Image& picture() const override;

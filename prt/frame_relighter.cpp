@@ -38,16 +38,17 @@ double picture_norm(const Image& picture) {
   return std::sqrt(sum);
 }
 
-// What streaming a column is like, in bytes: a column is a run in each chunk, and to begin one
-// takes as long as to read a kilobyte.
-std::vector<double> column_costs(const Transport& transport) {
+// What streaming columns is like, in bytes: a column is a run in each chunk, and to begin one takes
+// as long as to read a kilobyte.
+double cost(std::uint64_t bytes, std::uint64_t runs) {
+  return static_cast<double>(bytes) + 1024 * static_cast<double>(runs);
+}
+
+std::vector<double> column_costs(const Transport& transport, const RowSums* sums) {
   std::vector<double> costs(static_cast<std::size_t>(transport.layout().size()));
   for (std::size_t j = 0; j < costs.size(); ++j) {
     const int index = static_cast<int>(j);
-    costs[j] = static_cast<double>(transport.column_bytes(index));
-    for (int chunk = 0; chunk < transport.chunk_count(); ++chunk) {
-      if (transport.column(chunk, index).present) costs[j] += 1024;
-    }
+    costs[j] = cost(transport.column_bytes(index), sums ? sums->column_runs(index) : 0);
   }
   return costs;
 }
@@ -192,7 +193,8 @@ const FrameMetrics& FrameRelighter::relight(std::span<const Rgb> target, FrameSt
 
   // Decide which wavelets change, stream their columns, make the picture.
   if (budget_.kind == BudgetKind::error) estimator();
-  if (budget_.kind == BudgetKind::milliseconds && !time_) time_.emplace(column_costs(transport()));
+  if (budget_.kind == BudgetKind::milliseconds && !time_)
+    time_.emplace(column_costs(transport(), relighter_->row_sums()));
   const Clock::time_point begin = Clock::now();
   if (budget_.kind == BudgetKind::error && judged_from_ != relighter_->camera()) {
     // A relighter looks when it applies, whatever that changes.
@@ -201,11 +203,14 @@ const FrameMetrics& FrameRelighter::relight(std::span<const Rgb> target, FrameSt
     know_view();
   }
   if (budget_.kind == BudgetKind::milliseconds) {
+    const RowSums* sums = relighter_->row_sums();
     reset_bytes_.resize(static_cast<std::size_t>(layout.band_count()));
     for (int b = 0; b < layout.band_count(); ++b) {
-      reset_bytes_[static_cast<std::size_t>(b)] = relighter_->reset_bytes(b);
+      reset_bytes_[static_cast<std::size_t>(b)] =
+          sums ? cost(sums->reset_bytes(b), sums->reset_runs(b)) : 0;
     }
-    time_->start(budget_.value, begin, reset_bytes_, relighter_->fold_bytes());
+    time_->start(budget_.value, begin, reset_bytes_,
+                 sums ? cost(sums->fold_bytes(), sums->fold_runs()) : 0);
   }
   const LightingUpdate& update = decide(target, start);
   const Clock::time_point decided = Clock::now();

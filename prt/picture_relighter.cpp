@@ -137,14 +137,8 @@ std::span<const Rgb> PictureRelighter::view_factors() const {
   return state_->finish ? state_->finish->factors() : std::span<const Rgb>();
 }
 
-double PictureRelighter::reset_bytes(int band) const {
-  const RowSums& sums = state_->image ? state_->image->sums() : state_->vertices->sums();
-  return static_cast<double>(sums.reset_bytes(band));
-}
-
-double PictureRelighter::fold_bytes() const {
-  const RowSums& sums = state_->image ? state_->image->sums() : state_->vertices->sums();
-  return static_cast<double>(sums.fold_bytes());
+const RowSums* PictureRelighter::row_sums() const {
+  return state_->image ? &state_->image->sums() : &state_->vertices->sums();
 }
 
 }  // namespace haarlight

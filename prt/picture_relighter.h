@@ -30,8 +30,7 @@ class PictureRelighter final : public Relighter {
   bool shows_rows() const override { return true; }
   void vertex_weights(std::vector<float>& weights) const override;
   std::span<const Rgb> view_factors() const override;
-  double reset_bytes(int band) const override;
-  double fold_bytes() const override;
+  const RowSums* row_sums() const override;
 
  private:
   struct State;

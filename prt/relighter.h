@@ -12,6 +12,7 @@
 #include "core/image.h"
 #include "prt/lighting_update.h"
 #include "prt/relight_stats.h"
+#include "prt/row_sums.h"
 #include "prt/transport.h"
 
 namespace haarlight {
@@ -50,10 +51,8 @@ class Relighter {
   virtual std::span<const Rgb> view_factors() const { return {}; }
   /// What it has yet to follow: see ErrorJudge::set_pending.
   virtual void pending_rows(std::vector<double>& rows) const { rows.clear(); }
-  /// What the next apply() would move beside its columns, in bytes: to take back a band, and in any
-  /// case. See RowSums::reset_bytes and fold_bytes.
-  virtual double reset_bytes(int band) const { return static_cast<void>(band), 0.0; }
-  virtual double fold_bytes() const { return 0; }
+  /// The sums of T's rows, for what the next apply() would move; null where there are none.
+  virtual const RowSums* row_sums() const { return nullptr; }
 
  protected:
   Relighter() = default;

@@ -55,8 +55,13 @@ struct RowSums::State {
     logged.resize(columns);
     in_log.assign(columns, 0);
     bytes_of.resize(columns);
+    runs_of.resize(columns);
     for (std::size_t j = 0; j < columns; ++j) {
-      bytes_of[j] = transport.column_bytes(static_cast<int>(j));
+      const int index = static_cast<int>(j);
+      bytes_of[j] = transport.column_bytes(index);
+      for (int chunk = 0; chunk < transport.chunk_count(); ++chunk) {
+        runs_of[j] += transport.column(chunk, index).present != nullptr;
+      }
     }
     columns_scratch.reserve(columns);
   }
@@ -71,6 +76,7 @@ struct RowSums::State {
   struct Band {
     std::vector<int> log;         // coefficients with an entry in `logged`
     std::uint64_t log_bytes = 0;  // of their columns
+    std::uint64_t log_runs = 0;   // likewise
     HugePageVector<double> kept;  // as totals, or not allocated
     bool kept_lit = false;
     std::vector<int> shown;  // coefficients that moved since the band was last empty
@@ -82,6 +88,7 @@ struct RowSums::State {
   std::vector<RgbD> logged;  // sum of deltas since the band was last empty or folded
   std::vector<std::uint8_t> in_log;
   std::vector<std::uint64_t> bytes_of;
+  std::vector<std::uint32_t> runs_of;  // chunks that have a column
 
   std::vector<WaveletDelta> columns_scratch;
   bool expect_resets = true;
@@ -121,6 +128,7 @@ struct RowSums::State {
       in_log[j] = 1;
       b.log.push_back(delta.index);
       b.log_bytes += bytes_of[j];
+      b.log_runs += runs_of[j];
     }
     logged[j] += delta.delta;
   }
@@ -141,7 +149,7 @@ struct RowSums::State {
       in_log[static_cast<std::size_t>(index)] = 0;
     }
     b.log.clear();
-    b.log_bytes = 0;
+    b.log_bytes = b.log_runs = 0;
   }
 
   // Streams columns into rows laid out as totals; returns the bytes of sums read and written for
@@ -182,6 +190,7 @@ struct RowSums::State {
       const auto j = static_cast<std::size_t>(b.log[count++]);
       columns_scratch.push_back({static_cast<int>(j), logged[j]});
       folded += bytes_of[j];
+      b.log_runs -= runs_of[j];
       logged[j] = {};
       in_log[j] = 0;
     }
@@ -325,13 +334,27 @@ std::uint64_t RowSums::fold_bytes() const {
   return longest ? 3 * state_->picture_bytes() : 0;
 }
 
+std::uint64_t RowSums::reset_runs(int band) const {
+  return state_->band[static_cast<std::size_t>(band)].log_runs;
+}
+
+std::uint64_t RowSums::fold_runs() const {
+  const State::Band* longest = state_->to_fold();
+  return longest ? longest->log_runs * state_->picture_bytes() / longest->log_bytes : 0;
+}
+
+std::uint64_t RowSums::column_runs(int index) const {
+  return state_->runs_of[static_cast<std::size_t>(index)];
+}
+
 const Transport& RowSums::transport() const { return state_->transport; }
 std::span<const double> RowSums::totals() const { return state_->totals; }
 
 std::uint64_t RowSums::extra_bytes() const {
   const State& s = *state_;
   std::uint64_t bytes = s.picture_bytes() + 2 * s.logged.size() * (sizeof(RgbD) + 1) +
-                        8 * s.bytes_of.size() + s.columns_scratch.capacity() * sizeof(WaveletDelta);
+                        12 * s.bytes_of.size() +
+                        s.columns_scratch.capacity() * sizeof(WaveletDelta);
   for (const auto& band : s.band) {
     bytes += band.kept.size() * sizeof(double) + 4 * (band.log.size() + band.shown.size());
   }

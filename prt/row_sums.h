@@ -55,6 +55,11 @@ class RowSums {
   /// stream, and what a long log asks for unless its band is reset.
   std::uint64_t reset_bytes(int band) const;
   std::uint64_t fold_bytes() const;
+  /// Likewise, in how many runs its columns would be read: one a column and chunk that has it.
+  std::uint64_t reset_runs(int band) const;
+  std::uint64_t fold_runs() const;
+  /// Of one column.
+  std::uint64_t column_runs(int index) const;
 
   const Transport& transport() const;
   /// All totals: rows() * 3 values, [block][channel][row of block].

@@ -250,6 +250,36 @@ TEST(RowSums, AnEmptyUpdateTouchesNothing) {
   EXPECT_EQ(stats.columns, 0);
 }
 
+TEST(RowSums, WhatAResetWouldStreamIsKnownBefore) {
+  const SmallTransport small = fixtures::small_transport(8, 200, 130, 53, 0.2);
+  RowSums sums(build_transport(small.info, small.tiles, small.thresholds));
+  const Transport& transport = sums.transport();
+  const HaarLayout& layout = transport.layout();
+  const int band = layout.band_count() - 1, begin = layout.band(band).begin;
+  LightingUpdate update;
+  update.deltas.push_back({0, {1, 1, 1}});  // light that stays
+  std::uint64_t runs = 0;
+  for (int j = begin; j < begin + 40; j += 3) {
+    update.deltas.push_back({j, {1, 2, 3}});
+    std::uint64_t of_column = 0;
+    for (int chunk = 0; chunk < transport.chunk_count(); ++chunk) {
+      of_column += transport.column(chunk, j).present != nullptr;
+    }
+    EXPECT_EQ(sums.column_runs(j), of_column);
+    runs += of_column;
+  }
+  sums.apply(update);
+  sums.apply(update);  // the same columns: no longer a log
+  EXPECT_GT(runs, 0u);
+  EXPECT_EQ(sums.reset_runs(band), runs);
+  const std::uint64_t bytes = sums.reset_bytes(band);
+  LightingUpdate reset;
+  reset.reset[static_cast<std::size_t>(band)] = true;
+  EXPECT_EQ(sums.apply(reset).transport_bytes, bytes);
+  EXPECT_EQ(sums.reset_runs(band), 0u);
+  EXPECT_EQ(sums.reset_bytes(band), 0u);
+}
+
 TEST(ImageRelighter, AgreesWithTheOneCallAndWithTheDenseProduct) {
   const SmallTransport small = fixtures::small_transport(8, 37, 29, 61);
   const Transport transport = build_transport(small.info, small.tiles, small.thresholds);
