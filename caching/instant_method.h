@@ -29,7 +29,6 @@ struct InstantOptions {
   InstantCacheOptions cache;    ///< all but its lengths
   int pattern = 3;              ///< InterleavedOptions::pattern
   SurfacePointOptions points;
-  bool show_records = false;  ///< an extra picture: records by how long they have lived
 };
 
 /// Direct light and lobes as surface_points() has them, indirect light by virtual lights: paths of
