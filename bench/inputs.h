@@ -2,6 +2,8 @@
 
 #pragma once
 
+#include <benchmark/benchmark.h>
+
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -9,6 +11,7 @@
 
 #include "core/rgb.h"
 #include "precompute/scene.h"
+#include "prt/row_sums.h"
 #include "prt/transport.h"
 
 namespace haarlight::bench {
@@ -24,6 +27,9 @@ struct Inputs {
 
 /// Filled by main before the cases run.
 Inputs& inputs();
+
+/// Whether `sums` are state.iterations() times those of `once`; the case is an error if not.
+void expect_repeated(benchmark::State& state, const RowSums& sums, const RowSums& once);
 
 void register_kernels();
 void register_cpca_kernels();

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -17,6 +18,16 @@
 #include "prt/motion.h"
 
 namespace haarlight::bench {
+
+void expect_repeated(benchmark::State& state, const RowSums& sums, const RowSums& once) {
+  const auto times = static_cast<double>(state.iterations());
+  for (std::size_t i = 0; i < sums.totals().size(); ++i) {
+    if (std::abs(sums.totals()[i] - times * once.totals()[i]) > 1e-9 * times) {
+      state.SkipWithError("the sums are not those of the columns");
+      return;
+    }
+  }
+}
 
 Inputs& inputs() {
   static Inputs all;

@@ -64,20 +64,26 @@ double slope_of(const RecordValue& value) {
 
 }  // namespace
 
-double record_radius(const RecordValue& value, double mean_distance, double least, double most) {
-  const double slope = slope_of(value);
+double reach_of(double light, double slope, double mean_distance, double least, double most) {
   double radius = mean_distance;
-  if (slope > 0) radius = std::min(radius, luminance(value.irradiance) / slope);
+  if (slope > 0) radius = std::min(radius, light / slope);
   if (std::isnan(radius)) radius = least;
   return std::clamp(radius, least, most);
 }
 
+double share_kept(double light, double slope, double radius) {
+  const double used = slope * radius, whole = std::max(light, 0.0);
+  return used > whole ? whole / used : 1;
+}
+
+double record_radius(const RecordValue& value, double mean_distance, double least, double most) {
+  return reach_of(luminance(value.irradiance), slope_of(value), mean_distance, least, most);
+}
+
 RecordValue limited(RecordValue value, double radius) {
-  const double used = slope_of(value) * radius, whole = std::max(luminance(value.irradiance), 0.0);
-  if (used > whole) {
-    value.translation_x *= whole / used;
-    value.translation_y *= whole / used;
-  }
+  const double share = share_kept(luminance(value.irradiance), slope_of(value), radius);
+  value.translation_x *= share;
+  value.translation_y *= share;
   return value;
 }
 

@@ -39,6 +39,11 @@ double record_weight(double error, double accuracy);
 RgbD extrapolated(const PlaceFrame& at, const RecordValue& value, const Vec3& position,
                   const Vec3& shading);
 
+/// Of any quantity of light and its slope, its change a metre along its translation gradient: the
+/// radius of record_radius(), and what share of the gradient limited() keeps.
+double reach_of(double light, double slope, double mean_distance, double least, double most);
+double share_kept(double light, double slope, double radius);
+
 /// The radius of a record whose harmonic mean distance is `mean_distance` (metres, may be 0 or
 /// infinite): not beyond where the translation gradient would have used up the irradiance, nor
 /// outside [least, most], metres, 0 < least <= most.

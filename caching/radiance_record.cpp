@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "caching/irradiance_record.h"
+
 namespace haarlight {
 namespace {
 
@@ -82,20 +84,14 @@ RadianceValue radiance_value(const Hemisphere& h) {
 }
 
 double record_radius(const RadianceValue& value, double mean_distance, double least, double most) {
-  const double slope = slope_of(value);
-  double radius = mean_distance;
-  if (slope > 0) radius = std::min(radius, mean_of(value.coefficient) / slope);
-  if (std::isnan(radius)) radius = least;
-  return std::clamp(radius, least, most);
+  return reach_of(mean_of(value.coefficient), slope_of(value), mean_distance, least, most);
 }
 
 RadianceValue limited(RadianceValue value, double radius) {
-  const double used = slope_of(value) * radius, whole = std::max(mean_of(value.coefficient), 0.0);
-  if (used > whole) {
-    const auto share = static_cast<float>(whole / used);
-    for (float& x : value.along_x) x *= share;
-    for (float& x : value.along_y) x *= share;
-  }
+  const auto share =
+      static_cast<float>(share_kept(mean_of(value.coefficient), slope_of(value), radius));
+  for (float& x : value.along_x) x *= share;
+  for (float& x : value.along_y) x *= share;
   return value;
 }
 

@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 
 #include "core/error.h"
 #include "core/hash_bits.h"
 #include "core/parallel.h"
 #include "core/simd.h"
+#include "prt/stored_blocks.h"
 #include "prt/tile_codec.h"
 
 namespace haarlight {
@@ -57,7 +57,6 @@ void ChunkSketch::add(int chunk) {
   const auto terms = static_cast<std::size_t>(rows_.terms());
   const std::size_t first = static_cast<std::size_t>(chunk) * kChunkRows;
   const auto output = transport.row_output().subspan(first, kChunkRows);
-  const std::uint64_t* rgb = transport.rgb_blocks(chunk);
 
   // Rows of a block may be of any terms in principle; what a block needs is found once.
   std::vector<float*> to(kChunkRows, nullptr);
@@ -90,24 +89,21 @@ void ChunkSketch::add(int chunk) {
         for (std::size_t d = 0; d < dims_; ++d) white[k][d] += direction[k * channels + c][d];
       }
     }
-    std::size_t next = 0;
-    for (std::size_t w = 0; w < 4; ++w) {
-      for (std::uint64_t bits = column.present[w]; bits; bits &= bits - 1) {
-        const auto bit = static_cast<std::size_t>(std::countr_zero(bits));
-        const std::size_t block = 64 * w + bit;
-        const bool is_rgb = rgb[w] >> bit & 1;
-        for (std::size_t c = 0; c < (is_rgb ? 3u : 1u); ++c, ++next) {
-          const float scale = scale_from_bits(column.scales[next]);
-          for (std::size_t r = 0; r < kBlock; ++r) {
-            factor[r] = scale * static_cast<float>(column.values[next * kBlock + r]);
-            if (!is_rgb) factor[r] *= share * weight[block * kBlock + r];
-          }
-          const std::size_t k = term_of[block];
-          const std::vector<float>& along = is_rgb ? direction[k * channels + c] : white[k];
-          add_block(along.data(), factor.data(), to.data() + block * kBlock, dims_);
-        }
-      }
-    }
+    for_stored_blocks(column, transport.rgb_blocks(chunk),
+                      [&](std::size_t block, bool is_rgb, const std::uint16_t* scales,
+                          const std::int8_t* values) {
+                        for (std::size_t c = 0; c < (is_rgb ? 3u : 1u); ++c) {
+                          const float scale = scale_from_bits(scales[c]);
+                          for (std::size_t r = 0; r < kBlock; ++r) {
+                            factor[r] = scale * static_cast<float>(values[c * kBlock + r]);
+                            if (!is_rgb) factor[r] *= share * weight[block * kBlock + r];
+                          }
+                          const std::size_t k = term_of[block];
+                          const std::vector<float>& along =
+                              is_rgb ? direction[k * channels + c] : white[k];
+                          add_block(along.data(), factor.data(), to.data() + block * kBlock, dims_);
+                        }
+                      });
   }
 }
 

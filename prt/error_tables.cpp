@@ -3,12 +3,12 @@
 #include "prt/error_tables.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 
 #include "core/parallel.h"
 #include "core/simd.h"
+#include "prt/stored_blocks.h"
 #include "prt/tile_codec.h"
 
 namespace haarlight {
@@ -65,28 +65,22 @@ template <typename Done>
 void add_column(const std::uint64_t* rgb_blocks, const ColumnBlocks& blocks, std::size_t first,
                 const RowFactors& rows, const std::vector<std::uint8_t>& group_of_block,
                 const Done& done) {
-  const std::uint16_t* scale = blocks.scales;
-  const std::int8_t* value = blocks.values;
   GroupSums part{};
   std::size_t group = ~std::size_t{0};
-  for (std::size_t word = 0; word < 4; ++word) {
-    for (std::uint64_t bits = blocks.present[word]; bits; bits &= bits - 1) {
-      const auto bit = static_cast<std::size_t>(std::countr_zero(bits));
-      const std::size_t block = first + 64 * word + bit, at = block * kBlock;
-      if (group_of_block[block] != group) {
-        if (group != ~std::size_t{0}) done(group, part);
-        part = {};
-        group = group_of_block[block];
-      }
-      const bool rgb = rgb_blocks[word] >> bit & 1;
-      float scales[3];
-      for (std::size_t ch = 0; ch < 3; ++ch) scales[ch] = scale_from_bits(scale[rgb ? ch : 0]);
-      add_block(value, rgb ? kRows : 0, scales, rows.factor.data() + at,
-                rows.norm_factor.data() + at, rows.sign.data() + at, part);
-      scale += rgb ? 3 : 1;
-      value += rgb ? 3 * kRows : kRows;
-    }
-  }
+  for_stored_blocks(
+      blocks, rgb_blocks,
+      [&](std::size_t b, bool rgb, const std::uint16_t* scale, const std::int8_t* value) {
+        const std::size_t block = first + b, at = block * kBlock;
+        if (group_of_block[block] != group) {
+          if (group != ~std::size_t{0}) done(group, part);
+          part = {};
+          group = group_of_block[block];
+        }
+        float scales[3];
+        for (std::size_t ch = 0; ch < 3; ++ch) scales[ch] = scale_from_bits(scale[rgb ? ch : 0]);
+        add_block(value, rgb ? kRows : 0, scales, rows.factor.data() + at,
+                  rows.norm_factor.data() + at, rows.sign.data() + at, part);
+      });
   if (group != ~std::size_t{0}) done(group, part);
 }
 

@@ -3,11 +3,11 @@
 #include "prt/sample_rows.h"
 
 #include <algorithm>
-#include <bit>
 #include <utility>
 
 #include "core/error.h"
 #include "core/parallel.h"
+#include "prt/stored_blocks.h"
 #include "prt/tile_codec.h"
 
 namespace haarlight {
@@ -59,17 +59,12 @@ void SampleRows::read_slice(const Transport& transport, int slice, Slice& out) c
   out.first.push_back(0);
   for (int j = begin; j < end; ++j) {
     for (int chunk = 0; chunk < transport.chunk_count(); ++chunk) {
-      const ColumnBlocks stored = transport.column(chunk, j);
-      if (!stored.present) continue;
-      const std::uint16_t* scale = stored.scales;
-      const std::int8_t* q = stored.values;
-      for (std::size_t word = 0; word < 4; ++word) {
-        for (std::uint64_t bits = stored.present[word]; bits; bits &= bits - 1) {
-          const auto bit = static_cast<std::size_t>(std::countr_zero(bits));
-          const bool rgb = transport.rgb_blocks(chunk)[word] >> bit & 1;
-          const std::int32_t place =
-              place_of_block_[static_cast<std::size_t>(chunk) * kChunkBlocks + 64 * word + bit];
-          if (place >= 0) {
+      for_stored_blocks(
+          transport.column(chunk, j), transport.rgb_blocks(chunk),
+          [&](std::size_t block, bool rgb, const std::uint16_t* scale, const std::int8_t* q) {
+            const std::int32_t place =
+                place_of_block_[static_cast<std::size_t>(chunk) * kChunkBlocks + block];
+            if (place < 0) return;
             const auto at = static_cast<std::size_t>(place);
             read[at] = j;
             for (std::size_t k = 0; k < kBlock; ++k) {
@@ -77,11 +72,7 @@ void SampleRows::read_slice(const Transport& transport, int slice, Slice& out) c
               value[at * kBlock + k] =
                   static_cast<float>(q[from]) * scale_from_bits(scale[from / kRows]);
             }
-          }
-          scale += rgb ? 3 : 1;
-          q += rgb ? kBlock : kRows;
-        }
-      }
+          });
     }
     for (std::size_t s = 0; s < sums_.size(); ++s) {
       const RowSum& sum = sums_[s];

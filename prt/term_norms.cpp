@@ -3,11 +3,11 @@
 #include "prt/term_norms.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "core/parallel.h"
 #include "core/simd.h"
+#include "prt/stored_blocks.h"
 #include "prt/tile_codec.h"
 
 namespace haarlight {
@@ -77,40 +77,31 @@ TermNorms::TermNorms(const Transport& transport, std::span<const std::uint32_t> 
     for (int j = begin; j < end; ++j) {
       std::fill(sums.begin(), sums.end(), 0.0);
       for (int chunk = 0; chunk < transport.chunk_count(); ++chunk) {
-        const ColumnBlocks stored = transport.column(chunk, j);
-        if (!stored.present) continue;
-        const std::uint16_t* scale = stored.scales;
-        const std::int8_t* q = stored.values;
-        for (std::size_t word = 0; word < 4; ++word) {
-          for (std::uint64_t bits = stored.present[word]; bits; bits &= bits - 1) {
-            const auto bit = static_cast<std::size_t>(std::countr_zero(bits));
-            const std::size_t block =
-                static_cast<std::size_t>(chunk) * kChunkBlocks + 64 * word + bit;
-            const bool rgb = transport.rgb_blocks(chunk)[word] >> bit & 1;
-            float scales[3];
-            for (std::size_t ch = 0; ch < 3; ++ch) {
-              scales[ch] = scale_from_bits(scale[rgb ? ch : 0]);
-            }
-            squares_of(q, rgb ? kRows : 0, scales, factor.data() + block * kBlock, squares);
-            scale += rgb ? 3 : 1;
-            q += rgb ? kBlock : kRows;
-            const std::uint32_t whole = class_of_block[block];
-            if (whole == kNoOutput) continue;
-            for (std::size_t ch = 0; ch < 3; ++ch) {
-              if (whole < count) {
-                float sum = 0;
-                for (std::size_t r = 0; r < kRows; ++r) sum += squares[ch * kRows + r];
-                sums[3 * std::size_t{whole} + ch] += static_cast<double>(sum);
-                continue;
+        for_stored_blocks(
+            transport.column(chunk, j), transport.rgb_blocks(chunk),
+            [&](std::size_t b, bool rgb, const std::uint16_t* scale, const std::int8_t* q) {
+              const std::size_t block = static_cast<std::size_t>(chunk) * kChunkBlocks + b;
+              float scales[3];
+              for (std::size_t ch = 0; ch < 3; ++ch) {
+                scales[ch] = scale_from_bits(scale[rgb ? ch : 0]);
               }
-              for (std::size_t r = 0; r < kRows; ++r) {
-                const std::uint32_t of = class_of_row[block * kRows + r];
-                if (of == kNoOutput) continue;
-                sums[3 * std::size_t{of} + ch] += static_cast<double>(squares[ch * kRows + r]);
+              squares_of(q, rgb ? kRows : 0, scales, factor.data() + block * kBlock, squares);
+              const std::uint32_t whole = class_of_block[block];
+              if (whole == kNoOutput) return;
+              for (std::size_t ch = 0; ch < 3; ++ch) {
+                if (whole < count) {
+                  float sum = 0;
+                  for (std::size_t r = 0; r < kRows; ++r) sum += squares[ch * kRows + r];
+                  sums[3 * std::size_t{whole} + ch] += static_cast<double>(sum);
+                  continue;
+                }
+                for (std::size_t r = 0; r < kRows; ++r) {
+                  const std::uint32_t of = class_of_row[block * kRows + r];
+                  if (of == kNoOutput) continue;
+                  sums[3 * std::size_t{of} + ch] += static_cast<double>(squares[ch * kRows + r]);
+                }
               }
-            }
-          }
-        }
+            });
       }
       for (std::size_t i = 0; i < sums.size(); ++i) {
         norm[static_cast<std::size_t>(j) * sums.size() + i] =

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "caching/frame_tracer.h"
+#include "tests/caching/estimate.h"
 #include "tests/precompute/shapes.h"
 
 namespace haarlight {
@@ -25,21 +26,6 @@ std::shared_ptr<const EnvironmentLight> picture_light(float low, float high, int
   return std::make_shared<const EnvironmentLight>(Environment(picture));
 }
 
-struct Estimate {
-  double mean = 0, error = 0;
-};
-template <typename Draw>
-Estimate estimate(int count, const Draw& draw) {
-  double sum = 0, squares = 0;
-  for (int i = 0; i < count; ++i) {
-    PathRandom random(mix_bits(41, static_cast<std::uint64_t>(i)));
-    const double x = draw(random);
-    sum += x, squares += x * x;
-  }
-  const double mean = sum / count;
-  return {mean, std::sqrt(std::max(squares / count - mean * mean, 0.0) / count)};
-}
-
 Vec3 any_direction(PathRandom& random) {
   const double y = 2 * random.next() - 1, turn = 2 * kPi * random.next();
   const double ring = std::sqrt(1 - y * y);
@@ -50,15 +36,15 @@ TEST(EnvironmentLight, ChancesAreADensityAndSamplesHaveIt) {
   const auto light = picture_light(0.1f, 500);
   // The integral of the density over all directions is 1.
   const Estimate whole = estimate(
-      200'000, [&](PathRandom& random) { return light->pdf(any_direction(random)) * 4 * kPi; });
+      41, 200'000, [&](PathRandom& random) { return light->pdf(any_direction(random)) * 4 * kPi; });
   EXPECT_NEAR(whole.mean, 1, 5 * whole.error);
   // Of all samples as many fall on the patch as its density says, and each bears its own.
   const auto on_patch = [](const Vec3& d) { return d.x > 0.6 && d.y > 0.6; };
-  const Estimate wanted = estimate(200'000, [&](PathRandom& random) {
+  const Estimate wanted = estimate(41, 200'000, [&](PathRandom& random) {
     const Vec3 d = any_direction(random);
     return on_patch(d) ? light->pdf(d) * 4 * kPi : 0;
   });
-  const Estimate found = estimate(20'000, [&](PathRandom& random) {
+  const Estimate found = estimate(41, 20'000, [&](PathRandom& random) {
     const double u = random.next(), v = random.next();
     const auto sample = light->sample(u, v);
     EXPECT_NEAR(sample.pdf, light->pdf(sample.from), 1e-9 * sample.pdf);
@@ -81,7 +67,7 @@ TEST(EnvironmentLight, WhiteBodiesVanishInAnEvenPicture) {
     frame.environment_turn = rotation_y(0.4);
     const FrameTracer tracer(frame);
     for (const double x : {0.0, 0.3, 0.9}) {
-      const Estimate found = estimate(2000, [&](PathRandom& random) {
+      const Estimate found = estimate(41, 2000, [&](PathRandom& random) {
         return tracer.radiance({x, 0, 3}, {0, 0, -1}, random).r;
       });
       // A smooth normal over a flat triangle turns a few paths into the body: 1 % of room.
@@ -118,7 +104,7 @@ TEST(EnvironmentLight, AnEvenPictureIsAConstantBackground) {
   for (const Vec3& aim : {Vec3{-0.5, 0.3, 0}, Vec3{0.6, 0.6, 0}, Vec3{0, 0, 0.4}}) {
     const Vec3 way = normalize(by_picture.visibility().to_local(aim) - eye);
     const auto of = [&](const FrameTracer& tracer) {
-      return estimate(8000,
+      return estimate(41, 8000,
                       [&](PathRandom& random) { return tracer.radiance(eye, way, random).g; });
     };
     const Estimate a = of(by_picture), b = of(by_constant);
@@ -156,7 +142,7 @@ TEST(EnvironmentLight, APatchOverAPlaneIsItsIntegralAndTurns) {
     ASSERT_TRUE(hit);
     const Bsdf bsdf = bsdf_at(frame.scene, *hit);
     for (const bool all : {true, false}) {
-      const Estimate found = estimate(20'000, [&](PathRandom& random) {
+      const Estimate found = estimate(41, 20'000, [&](PathRandom& random) {
         if (all) return tracer.radiance(eye, {0, -1, 0}, random).r;
         return tracer.environment_light(*hit, bsdf, random, false).r;
       });

@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/parallel.h"
+#include "tests/caching/estimate.h"
 #include "tests/precompute/shapes.h"
 
 namespace haarlight {
@@ -20,22 +21,6 @@ AnimatedFrame frame_of(Scene scene) {
   return frame;
 }
 
-// Mean and its standard error of `count` estimates.
-struct Estimate {
-  double mean = 0, error = 0;
-};
-template <typename Draw>
-Estimate estimate(int count, const Draw& draw) {
-  double sum = 0, squares = 0;
-  for (int i = 0; i < count; ++i) {
-    PathRandom random(mix_bits(77, static_cast<std::uint64_t>(i)));
-    const double x = draw(random);
-    sum += x, squares += x * x;
-  }
-  const double mean = sum / count;
-  return {mean, std::sqrt(std::max(squares / count - mean * mean, 0.0) / count)};
-}
-
 TEST(PathPicture, ClosedBoxThatShinesIsAFurnace) {
   // Inside a closed box of albedo a whose walls send E: L = E / (1 - a) everywhere.
   Scene scene = shapes::empty_scene();
@@ -44,7 +29,7 @@ TEST(PathPicture, ClosedBoxThatShinesIsAFurnace) {
   AnimatedFrame frame = frame_of(scene);
   frame.emission[0] = {{0.3, 0.3, 0.3}, true};
   const FrameTracer tracer(frame);
-  const Estimate found = estimate(20000, [&](PathRandom& random) {
+  const Estimate found = estimate(77, 20000, [&](PathRandom& random) {
     const Vec3 way = cosine_direction({0, 1, 0}, random.next(), random.next());
     return tracer.radiance({0, 0, 0}, way, random).g;
   });
@@ -64,7 +49,7 @@ TEST(PathPicture, WhiteBodiesVanishInEvenLight) {
     frame.background = {1, 1, 1};
     const FrameTracer tracer(frame);
     for (const double x : {0.0, 0.3, 0.9}) {
-      const Estimate found = estimate(2000, [&](PathRandom& random) {
+      const Estimate found = estimate(77, 2000, [&](PathRandom& random) {
         return tracer.radiance({x, 0, 3}, {0, 0, -1}, random).r;
       });
       // A smooth normal over a flat triangle turns a few paths into the body: 1 % of room.
@@ -115,7 +100,7 @@ TEST(PathPicture, AreaLightOverAPlaneIsTheClosedForm) {
   const Vec3 direction = normalize(Vec3{0, -1, -0.4});
   const Vec3 eye = tracer.visibility().to_local(direction * -1.3);
   for (const bool all : {true, false}) {
-    const Estimate found = estimate(20000, [&](PathRandom& random) {
+    const Estimate found = estimate(77, 20000, [&](PathRandom& random) {
       if (all) return tracer.radiance(eye, direction, random).r;
       const auto hit = surface_hit(frame.scene, tracer.visibility(), eye, direction);
       return tracer.direct(*hit, bsdf_at(frame.scene, *hit), random, false).r;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "data_gen/figures.h"
+#include "tests/data_gen/volume.h"
 
 namespace haarlight::data_gen {
 namespace {
@@ -25,15 +26,6 @@ std::size_t open_edges(const Scene& scene) {
     if (back == edges.end() || back->second != count) ++open;
   }
   return open;
-}
-
-double volume(const Scene& scene) {
-  double sum = 0;
-  for (const Triangle& t : scene.triangle) {
-    sum += dot(scene.position[t.vertex[0]],
-               cross(scene.position[t.vertex[1]], scene.position[t.vertex[2]]));
-  }
-  return sum / 6;
 }
 
 TEST(Isosurface, ASphereIsClosedAndHasItsVolume) {

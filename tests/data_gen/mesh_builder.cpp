@@ -8,19 +8,10 @@
 #include <cmath>
 #include <vector>
 
+#include "tests/data_gen/volume.h"
+
 namespace haarlight::data_gen {
 namespace {
-
-// Volume inside a closed mesh by the divergence theorem: a sixth of the sum of the triple products.
-// Negative when the triangles are turned inside out.
-double volume(const Scene& scene) {
-  double sum = 0;
-  for (const Triangle& t : scene.triangle) {
-    sum += dot(scene.position[t.vertex[0]],
-               cross(scene.position[t.vertex[1]], scene.position[t.vertex[2]]));
-  }
-  return sum / 6;
-}
 
 double smallest_agreement_of_normals(const Scene& scene) {
   double smallest = 1;
