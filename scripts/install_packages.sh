@@ -14,9 +14,9 @@ build=(g++ cmake ninja-build pkg-config libopenimageio-dev openimageio-tools lib
   libstb-dev fonts-dejavu-core)
 demo=(python3 python3-numpy python3-matplotlib)
 test=(patch python3 python3-numpy python3-matplotlib libgtest-dev librapidcheck-dev libbenchmark-dev
-  xvfb xauth libgl1-mesa-dri libgl1)
+  xvfb xauth libgl1-mesa-dri libgl1 assimp-testmodels)
 
-check=(clang libclang-rt-14-dev libomp-dev valgrind assimp-testmodels)
+check=(clang libclang-rt-14-dev libomp-dev valgrind)
 
 groups=("$@")
 if [ ${#groups[@]} -eq 0 ]; then groups=(build demo test); fi

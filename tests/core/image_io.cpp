@@ -183,6 +183,29 @@ TEST(ImageIo, EveryTruncationIsRefused) {
   }
 }
 
+// Whose file it is its first bytes say; the name only where they do not. One reader is asked: what
+// it refuses no other is tried on.
+TEST(ImageIo, PicturesAreReadByTheirContent) {
+  const TemporaryFolder folder;
+  const Image image = noise(5, 3);
+  for (const char* name : {"a.exr", "a.hdr", "a.png"}) {
+    save_image(folder / name, image);
+    const Image right = load_image(folder / name);
+    for (const char* other : {"b.exr", "b.hdr", "b.png", "b.jpg", "b.tga", "b"}) {
+      write_bytes(folder / other, read_bytes(folder / name));
+      EXPECT_EQ(load_image(folder / other).pixels, right.pixels) << name << " as " << other;
+    }
+  }
+  // A PNG's first bytes before an EXR's: the reader of PNG refuses it, with its reason.
+  write_bytes(folder / "c.exr", "\x89PNG" + read_bytes(folder / "a.exr").substr(4));
+  try {
+    load_image(folder / "c.exr");
+    FAIL() << "taken";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("PNG"), std::string::npos) << error.what();
+  }
+}
+
 TEST(ImageIo, WhatIsNoPictureIsRefused) {
   const TemporaryFolder folder;
   EXPECT_EQ(load_error(folder / "nothing.exr"), ErrorKind::missing);
