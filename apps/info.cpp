@@ -177,7 +177,7 @@ void print_source(const Json& source) {
 
 void print_text(const Json& d) {
   const auto line = [](const std::string& name, const std::string& value) {
-    fmt::print("{:<22}{}\n", name, value);
+    fmt::print("{:<21} {}\n", name, value);
   };
   line("file", fmt::format("{}, {}", d["file"].get<std::string>(), mebibytes(d["file_bytes"])));
   const bool mesh = d["kind"] != "image";
