@@ -63,7 +63,7 @@ std::vector<std::string> CachingMethod::figures() const {
 void CachingMethod::go_to(int number) {
   const auto begin = Clock::now();
   auto to = std::make_unique<CachedFrame>();
-  to->number = number;
+  to->number = number, to->lobes = &lobes_;
   if (now_ && now_->number + 1 == number && now_->next) {
     to->now = std::move(now_->next);
   } else {

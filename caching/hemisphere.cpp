@@ -17,12 +17,17 @@ Vec3 in_plane(double phi) { return {std::cos(phi), std::sin(phi), 0}; }
 
 }  // namespace
 
-std::size_t Hemisphere::stratum_of(const Vec3& d) const {
+Hemisphere::Coordinates Hemisphere::coordinates_of(const Vec3& d) const {
   const double up = std::min(even ? 1 - std::max(d.z, 0.0) : d.x * d.x + d.y * d.y, 1.0);
   double turn = std::atan2(d.y, d.x) / (2 * kPi);
   if (turn < 0) turn += 1;
-  return number(std::min(static_cast<int>(up * rings), rings - 1),
-                std::min(static_cast<int>(turn * sectors), sectors - 1));
+  return {up * rings, turn * sectors};
+}
+
+std::size_t Hemisphere::stratum_of(const Vec3& d) const {
+  const Coordinates at = coordinates_of(d);
+  return number(std::min(static_cast<int>(at.ring), rings - 1),
+                std::min(static_cast<int>(at.sector), sectors - 1));
 }
 
 Hemisphere stratified_hemisphere(int samples, std::uint64_t key, bool even) {

@@ -27,7 +27,12 @@ struct Hemisphere {
     return static_cast<std::size_t>(ring) * static_cast<std::size_t>(sectors) +
            static_cast<std::size_t>(sector);
   }
-  /// The stratum that a direction of the upper half is in.
+  /// Where a direction of the upper half is: ring in [0, rings], sector in [0, sectors], their
+  /// whole parts the stratum it is in. Equal areas here are equal (cosine-weighted) solid angles.
+  struct Coordinates {
+    double ring, sector;
+  };
+  Coordinates coordinates_of(const Vec3& d) const;
   std::size_t stratum_of(const Vec3& d) const;
 };
 

@@ -24,6 +24,8 @@ void add_light(std::vector<float>& to, const Harmonics& h, const RgbD& light) {
   }
 }
 
+constexpr double kLowest = 0.02;  // cosine of what lobes are looked up for
+
 double mean_of(const std::vector<float>& c) {
   return c.empty() ? 0 : static_cast<double>(luminance(Rgb{c[0], c[1], c[2]}));
 }
@@ -83,6 +85,19 @@ RadianceValue radiance_value(const Hemisphere& h) {
   return out;
 }
 
+RadianceValue coefficients_of(const Hemisphere& then, const Hemisphere& now,
+                              const RadianceValue& value) {
+  RadianceValue out;
+  out.coefficient = value.coefficient;
+  const double share = 2 * kPi / (now.rings * now.sectors);
+  for (std::size_t i = 0; i < now.direction.size(); ++i) {
+    if (then.radiance[i] == now.radiance[i]) continue;
+    add_light(out.coefficient, hemispherical_harmonics(now.direction[i]),
+              (then.radiance[i] - now.radiance[i]) * share);
+  }
+  return out;
+}
+
 double record_radius(const RadianceValue& value, double mean_distance, double least, double most) {
   return reach_of(mean_of(value.coefficient), slope_of(value), mean_distance, least, most);
 }
@@ -95,6 +110,38 @@ RadianceValue limited(RadianceValue value, double radius) {
   return value;
 }
 
+double temporal_ratio(const RadianceValue& now, const RadianceValue& next, const LobeView& view,
+                      const LobeHarmonics& lobes) {
+  constexpr double kOff = 0.2;
+  const auto light = [](const Harmonics& f, const RadianceValue& value) {
+    RgbD sum;
+    if (value.coefficient.empty()) return sum;
+    for (std::size_t i = 0; i < kHarmonics; ++i) {
+      const float* c = &value.coefficient[3 * i];
+      sum += RgbD(Rgb{c[0], c[1], c[2]}) * static_cast<double>(f[i]);
+    }
+    return RgbD{std::max(sum.r, 0.0), std::max(sum.g, 0.0), std::max(sum.b, 0.0)};
+  };
+  const Vec3 o = view.to_viewer;
+  const double away = std::max(std::hypot(o.x, o.y), 1e-9);
+  const Vec3 across = away > 1e-9 ? Vec3{-o.y / away, o.x / away, 0} : Vec3{0, 1, 0};
+  const Vec3 up = cross(o, across);
+  RgbD before, after, change;
+  for (int n = 0; n < 5; ++n) {
+    Vec3 to = o;
+    if (n > 0) to = to + (n < 3 ? across : up) * (n % 2 == 0 ? kOff : -kOff);
+    to.z = std::max(to.z, kLowest);
+    // The lobe as it is seen from there; its mirror direction is as far off.
+    const Harmonics f = lobes.at(view.table, normalize(to)).first;
+    const RgbD a = light(f, now), b = light(f, next);
+    before += a, after += b;
+    change += RgbD{std::abs(b.r - a.r), std::abs(b.g - a.g), std::abs(b.b - a.b)};
+  }
+  const RgbD least{std::min(before.r, after.r), std::min(before.g, after.g),
+                   std::min(before.b, after.b)};
+  return temporal_ratio(least, least + change);
+}
+
 RgbD lobe_radiance(const PlaceFrame& at, const RadianceValue& value, const Vec3& position,
                    const Bsdf& bsdf, std::int32_t table, const LobeHarmonics& lobes) {
   if (value.coefficient.empty()) return {};
@@ -102,7 +149,6 @@ RgbD lobe_radiance(const PlaceFrame& at, const RadianceValue& value, const Vec3&
   const Vec3 mirror = n * (2 * dot(n, bsdf.to_viewer)) - bsdf.to_viewer;
   Vec3 r = at.to_local(mirror);
   // Below the record's horizon, as at the rim of a ball: the lobe lies on it.
-  constexpr double kLowest = 0.02;
   if (r.z < kLowest) {
     r.z = kLowest;
     r = normalize(r);

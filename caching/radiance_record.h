@@ -7,6 +7,7 @@
 #include "caching/hemisphere.h"
 #include "caching/hemispherical_harmonics.h"
 #include "caching/lobe_harmonics.h"
+#include "caching/temporal_weight.h"
 
 namespace haarlight {
 
@@ -28,9 +29,29 @@ struct RadianceValue {
 /// as those of irradiance.
 RadianceValue radiance_value(const Hemisphere& hemisphere);
 
+/// Coefficients alone of `then`, the same strata of other light, by those of `now`, whose are
+/// `value`.
+RadianceValue coefficients_of(const Hemisphere& then, const Hemisphere& now,
+                              const RadianceValue& value);
+
 /// As record_radius() of irradiance records, by the mean radiance; as limited(), likewise.
 double record_radius(const RadianceValue& value, double mean_distance, double least, double most);
 RadianceValue limited(RadianceValue value, double radius);
+
+/// Who asked for a record: a lobe, and where it is seen from.
+struct LobeView {
+  std::int32_t table = 0;  ///< lobe_table_key()
+  Vec3 to_viewer;          ///< unit, in the record's PlaceFrame
+};
+
+/// The temporal radiance ratio of a record that is `now` and will be `next`: 1 plus the change of
+/// what a lobe shows, as a share of it, the largest of the channels. The lobe is looked at in its
+/// mirror direction and, because neighbours of other normals use the record, four about it, 0.2
+/// radians off; changes are summed by amount. Equation 21 compares coefficients one by one, each as
+/// a share of itself: any may be near 0, and those of high order are mostly noise, which no lobe
+/// shows.
+double temporal_ratio(const RadianceValue& now, const RadianceValue& next, const LobeView& view,
+                      const LobeHarmonics& lobes);
 
 /// What a lobe (unit shading normal, viewer in the world) sends to its viewer by a record at
 /// another place: the lobe is turned so that its mirror direction is right and its normal the

@@ -25,6 +25,9 @@ struct CacheRecord {
   Value value;         ///< in frame `born`
   Value change;        ///< a frame (Gautron 2007, equations 13 to 20)
   int last_used = -1;  ///< the last frame whose picture it had a part in
+  // Who asked for it first, or for the record that it replaces:
+  std::int32_t lobe = 0;  ///< lobe_table_key(), of records of radiance
+  Vec3 to_viewer;         ///< unit, world
 };
 
 /// All records of an animation. Looking up is safe from any number of threads, adding is not.

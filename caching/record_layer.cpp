@@ -41,11 +41,21 @@ Value value_of(const Hemisphere& h) {
   }
 }
 
-double ratio_of(const RecordValue& now, const RecordValue& next) {
+// The light of `then` alone, `now` being the same strata of light `value`.
+RecordValue light_of(const Hemisphere& then, const Hemisphere&, const RecordValue&) {
+  return record_value(then);
+}
+RadianceValue light_of(const Hemisphere& then, const Hemisphere& now, const RadianceValue& value) {
+  return coefficients_of(then, now, value);
+}
+
+double ratio_of(const RecordValue& now, const RecordValue& next, const LobeView&,
+                const LobeHarmonics*) {
   return temporal_ratio(now.irradiance, next.irradiance);
 }
-double ratio_of(const RadianceValue& now, const RadianceValue& next) {
-  return temporal_ratio(now.coefficient, next.coefficient);
+double ratio_of(const RadianceValue& now, const RadianceValue& next, const LobeView& view,
+                const LobeHarmonics* lobes) {
+  return temporal_ratio(now, next, view, *lobes);
 }
 
 // |a - b| as a share of b, summed over channels or coefficients.
@@ -94,6 +104,7 @@ void RecordLayer<Value>::make(const CachedFrame& frame, const std::vector<Reques
     auto begin = Clock::now();
     CacheRecord<Value>& r = m.record;
     r.place = request.place, r.key = request.key, r.born = frame.number;
+    r.lobe = request.lobe, r.to_viewer = request.to_viewer;
     const PlaceFrame at = place_in(frame.now->scene, r.place);
     Hemisphere h = stratified_hemisphere(options_.hemisphere_samples, r.key, kEven<Value>);
     std::vector<SeenPlace> seen;
@@ -111,9 +122,12 @@ void RecordLayer<Value>::make(const CachedFrame& frame, const std::vector<Reques
     const Hemisphere next = reprojected(h, seen, r.place, *frame.change, &changes);
     r.life = options_.age.longest;
     if (changes.moved + changes.covered + changes.holes > 0) {
-      const Value then = limited(value_of<Value>(next), r.radius);
-      r.life = lifespan(ratio_of(r.value, then), options_.age);
-      if (options_.gradients == TemporalGradients::extrapolated) r.change = then - r.value;
+      const bool gradients = options_.gradients == TemporalGradients::extrapolated;
+      const Value then =
+          gradients ? limited(value_of<Value>(next), r.radius) : light_of(next, h, r.value);
+      const LobeView view{r.lobe, at.to_local(r.to_viewer)};
+      r.life = lifespan(ratio_of(r.value, then, view, frame.lobes), options_.age);
+      if (gradients) r.change = then - r.value;
     }
     m.reproject_ms = ms_since(begin);
   });
@@ -142,7 +156,7 @@ void RecordLayer<Value>::update(const CachedFrame& frame, const GatherPoints& po
   for (std::uint32_t i = 0; i < cache_.records().size(); ++i) {
     const CacheRecord<Value>& r = cache_.records()[i];
     if (frame.number - r.born != r.life || r.last_used != frame.number - 1) continue;
-    requests.push_back({r.place, r.key, i});
+    requests.push_back({r.place, r.key, i, r.lobe, r.to_viewer});
   }
   make(frame, requests, report);
 
@@ -190,7 +204,8 @@ void RecordLayer<Value>::update(const CachedFrame& frame, const GatherPoints& po
       while (next < left.size() && requests.size() < kBatch) {
         std::uint64_t key = left[next].order ^ (kEven<Value> ? 0x9055 : 0);
         each_bare(left[next++], [&](const GatherPoint& point) {
-          requests.push_back({point.place, key = mix_bits(key, 1), std::nullopt});
+          requests.push_back(
+              {point.place, key = mix_bits(key, 1), std::nullopt, point.lobe, -point.direction});
         });
       }
       make(frame, requests, report);
@@ -208,7 +223,7 @@ void RecordLayer<Value>::close(const CachedFrame& frame, RecordReport& report) {
   for (const std::uint32_t i : cache_.alive()) {
     const CacheRecord<Value>& r = cache_.records()[i];
     if (r.born < frame.number && r.last_used == frame.number) {
-      requests.push_back({r.place, r.key, i});
+      requests.push_back({r.place, r.key, i, r.lobe, r.to_viewer});
     }
   }
   make(frame, requests, report);

@@ -45,6 +45,7 @@ struct CachedFrame {
   std::unique_ptr<AnimatedFrame> now, next;  ///< next, change: if records are temporal
   std::unique_ptr<FrameTracer> tracer;
   std::unique_ptr<FrameChange> change;
+  const LobeHarmonics* lobes = nullptr;  ///< tables of all lobes of this frame
   Camera camera;
   double build_ms = 0;
 };
@@ -88,6 +89,8 @@ class RecordLayer {
     BodyPlace place;
     std::uint64_t key;
     std::optional<std::uint32_t> replaces;
+    std::int32_t lobe = 0;
+    Vec3 to_viewer;
   };
   static bool wants(const GatherPoint& point);
   void make(const CachedFrame& frame, const std::vector<Request>& requests, RecordReport& report);

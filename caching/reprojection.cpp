@@ -48,16 +48,12 @@ RgbD lamp_light(const AnimatedFrame& frame, const PlaceFrame& at, std::uint64_t 
   return sum;
 }
 
-// The radiance that `seen` will send; `now` is where it is now.
-RgbD next_radiance(const SeenPlace& seen, const RgbD& radiance, const PlaceFrame& next,
+// The radiance that `seen` will send; `now` and `next` are where it is and will be.
+RgbD next_radiance(const SeenPlace& seen, const PlaceFrame& now, const PlaceFrame& next,
                    const FrameChange& change) {
   const std::uint32_t m = change.now().scene.triangle[seen.place.triangle].material;
   const RgbD color_now(change.now().scene.material[m].albedo);
   const RgbD color_next(change.next().scene.material[m].albedo);
-  if (!change.lights_change() && !change.moves(seen.place.triangle) && color_now == color_next) {
-    return radiance;
-  }
-  const PlaceFrame now = place_in(change.now().scene, seen.place);
   const RgbD before = lamp_light(change.now(), now, seen.by_lamps.hidden);
   const RgbD after = lamp_light(change.next(), next, seen.by_lamps.hidden);
   const auto one = [](double share, double b, double a, double albedo) {
@@ -70,21 +66,81 @@ RgbD next_radiance(const SeenPlace& seen, const RgbD& radiance, const PlaceFrame
   return (by_lamps + seen.rest * change.power_ratio()) * ratio_of(color_next, color_now);
 }
 
-// The deepest of the neighbours that something fell into, or none.
-std::size_t deepest_neighbour(const Hemisphere& h, const std::vector<bool>& filled, int ring,
-                              int sector) {
-  std::size_t best = h.direction.size();
-  for (int j = std::max(ring - 1, 0); j <= std::min(ring + 1, h.rings - 1); ++j) {
-    for (int turn = -1; turn <= 1; ++turn) {
-      const std::size_t i = h.number(j, (sector + turn + h.sectors) % h.sectors);
-      if (!filled[i]) continue;
-      if (best == h.direction.size() || h.distance[i] > h.distance[best]) best = i;
+// A part of a stratum of the next frame, and what is seen there.
+struct Part {
+  std::size_t stratum;
+  double distance, share;  // share of the stratum
+  RgbD radiance;
+};
+
+// The parts of strata that lie in [low, high) rings and [left, right) sectors.
+struct Patch {
+  double low, high, left, right;
+};
+template <typename Add>
+void cover(const Hemisphere& h, const Patch& p, const Add& add) {
+  const auto overlap = [](double from, double to, int cell) {
+    return std::min(to, cell + 1.0) - std::max(from, static_cast<double>(cell));
+  };
+  for (int row = static_cast<int>(std::floor(p.low)); row < p.high; ++row) {
+    const double rows = overlap(p.low, p.high, row);
+    // Beyond the pole there is the other side.
+    const int ring = row < 0 ? -1 - row : row;
+    const double turned = row < 0 ? 0.5 * h.sectors : 0;
+    if (!(rows > 0) || ring >= h.rings) continue;
+    const double left = p.left + turned, right = p.right + turned;
+    for (int column = static_cast<int>(std::floor(left)); column < right; ++column) {
+      const double columns = overlap(left, right, column);
+      const int k = column % h.sectors;
+      if (columns > 0) add(h.number(ring, k < 0 ? k + h.sectors : k), rows * columns);
     }
   }
-  return best;
 }
 
+// By how much the stratum of a surface grows on its way: projected (even strata: plain) solid
+// angle.
+double growth(bool even, const PlaceFrame& here, const Vec3& from, double cosine_now,
+              const PlaceFrame& there, const Vec3& way, double cosine_next) {
+  const auto angle = [&](const PlaceFrame& at, const Vec3& to, double cosine) {
+    const double square = dot(to, to);
+    return std::abs(dot(at.geometric_normal, to)) * (even ? 1 : cosine) /
+           (square * std::sqrt(square));
+  };
+  const double before = angle(here, from, cosine_now), after = angle(there, way, cosine_next);
+  // What is seen at a grazing angle grows without bounds.
+  constexpr double kMost = 4;
+  return before > 0 ? std::clamp(after / before, 1 / kMost, kMost) : 1;
+}
+
+// Strata of the next frame while parts fall into them.
+struct Strata {
+  explicit Strata(const Hemisphere& h)
+      : covered(h.direction.size()), deepest(covered.size(), -1), behind(covered.size()) {}
+  std::vector<double> covered;  // shares
+  std::vector<double> deepest;  // distance of the farthest part that is seen; -1: none
+  std::vector<RgbD> behind;     // its radiance
+
+  // Of the strata about one and itself: where the deepest part is; all their number if there is
+  // none.
+  std::size_t deepest_about(const Hemisphere& h, int ring, int sector, int reach) const {
+    std::size_t best = deepest.size();
+    for (int j = std::max(ring - reach, 0); j <= std::min(ring + reach, h.rings - 1); ++j) {
+      for (int turn = -reach; turn <= reach; ++turn) {
+        const std::size_t i = h.number(j, ((sector + turn) % h.sectors + h.sectors) % h.sectors);
+        if (deepest[i] < 0) continue;
+        if (best == deepest.size() || deepest[i] > deepest[best]) best = i;
+      }
+    }
+    return best;
+  }
+};
+
 }  // namespace
+
+bool FrameChange::recolors(std::uint32_t triangle) const {
+  const std::uint32_t m = now_.scene.triangle[triangle].material;
+  return !(now_.scene.material[m].albedo == next_.scene.material[m].albedo);
+}
 
 FrameChange::FrameChange(const AnimatedFrame& now, const AnimatedFrame& next)
     : now_(now), next_(next), moves_(now.scene.triangle.size()) {
@@ -106,54 +162,104 @@ FrameChange::FrameChange(const AnimatedFrame& now, const AnimatedFrame& next)
 Hemisphere reprojected(const Hemisphere& now, const std::vector<SeenPlace>& seen,
                        const BodyPlace& place, const FrameChange& change,
                        ReprojectionReport* report) {
+  constexpr double kRounding = 1e-9;  // of shares
   Hemisphere next = now;
   ReprojectionReport counts;
   const bool itself = change.moves(place.triangle);
   const PlaceFrame at = place_in(change.next().scene, place);
+  const PlaceFrame before = place_in(change.now().scene, place);
   const std::size_t size = seen.size();
-  std::fill(next.distance.begin(), next.distance.end(), -1);
-  std::vector<bool> filled(size);
+  std::vector<Part> moved;
+  std::vector<bool> stays(size, true);
   for (std::size_t i = 0; i < size; ++i) {
     const std::uint32_t triangle = seen[i].place.triangle;
-    std::size_t stratum = i;
-    double distance = now.distance[i];
-    RgbD radiance = now.radiance[i];
-    if (triangle == SeenPlace::kBelow) {
-      // The body's own ground turns with it.
-    } else if (triangle == SeenPlace::kBackground) {
+    RgbD& radiance = next.radiance[i];
+    if (triangle == SeenPlace::kBelow) continue;  // the body's own ground turns with it
+    if (triangle == SeenPlace::kBackground) {
       // What lies that way then: body and picture may have turned.
       radiance = change.next().background_from(normalize(at.to_world(now.direction[i])));
     } else {
+      const bool moves = change.moves(triangle);
+      const bool relit = moves || change.lights_change() || change.recolors(triangle);
+      if (!relit && !itself) continue;
+      const PlaceFrame here = place_in(change.now().scene, seen[i].place);
       const PlaceFrame there = place_in(change.next().scene, seen[i].place);
-      radiance = next_radiance(seen[i], radiance, there, change);
-      if (itself || change.moves(triangle)) {
+      if (relit) radiance = next_radiance(seen[i], here, there, change);
+      if (itself || moves) {
+        stays[i] = false;
+        ++counts.moved;
         const Vec3 way = there.position - at.position;
-        distance = length(way);
-        if (!(distance > 0)) continue;
+        const double distance = length(way);
+        if (!(distance > 0) || dot(there.geometric_normal, way) > 0) continue;
         const Vec3 d = at.to_local(way * (1 / distance));
         if (!(d.z > 0)) continue;
-        stratum = now.stratum_of(d);
-        // What turns its back now hides what it did before, and is as dark as can be told.
-        if (dot(there.geometric_normal, way) > 0) radiance = {};
+        const Vec3 from_here = here.position - before.position;
+        if (!(length(from_here) > 0)) continue;
+        const Vec3 old = before.to_local(normalize(from_here));
+        const Hemisphere::Coordinates from = now.coordinates_of(old), to = now.coordinates_of(d);
+        const double scale = std::sqrt(growth(now.even, here, from_here, old.z, there, way, d.z));
+        const double turn = to.sector - from.sector;
+        const int ring = static_cast<int>(i) / now.sectors;
+        const int sector = static_cast<int>(i) % now.sectors;
+        const double row = to.ring - scale * (from.ring - ring);
+        const double column = from.sector + turn - now.sectors * std::round(turn / now.sectors) -
+                              scale * (from.sector - sector);
+        cover(now, {row, row + scale, column, column + scale},
+              [&](std::size_t stratum, double share) {
+                moved.push_back({stratum, distance, share, radiance});
+              });
+        continue;
       }
     }
-    if (stratum != i || !(radiance == now.radiance[i])) ++counts.moved;
-    if (filled[stratum]) {
-      ++counts.covered;
-      if (!(distance < next.distance[stratum])) continue;
-    }
-    filled[stratum] = true;
-    next.distance[stratum] = distance, next.radiance[stratum] = radiance;
+    if (!(radiance == now.radiance[i])) ++counts.moved;
   }
+  if (std::find(stays.begin(), stays.end(), false) == stays.end()) {
+    if (report) *report = counts;
+    return next;
+  }
+
+  // The nearest parts of a stratum hide the others.
+  for (std::size_t i = 0; i < size; ++i) {
+    if (stays[i]) moved.push_back({i, now.distance[i], 1, next.radiance[i]});
+  }
+  std::stable_sort(moved.begin(), moved.end(), [](const Part& a, const Part& b) {
+    return a.stratum != b.stratum ? a.stratum < b.stratum : a.distance < b.distance;
+  });
+  Strata strata(now);
+  std::vector<double> nearness(size);
+  std::fill(next.radiance.begin(), next.radiance.end(), RgbD{});
+  for (const Part& p : moved) {
+    const std::size_t i = p.stratum;
+    const double share = std::min(p.share, 1 - strata.covered[i]);
+    if (p.share > share + kRounding) ++counts.covered;
+    if (!(share > 0)) continue;
+    strata.covered[i] += share;
+    next.radiance[i] += p.radiance * share, nearness[i] += share / p.distance;
+    if (share > kRounding) strata.deepest[i] = p.distance, strata.behind[i] = p.radiance;
+  }
+  for (std::size_t i = 0; i < size; ++i) {
+    // What lies below the horizon is behind nothing.
+    if (seen[i].place.triangle == SeenPlace::kBelow) strata.deepest[i] = -1;
+  }
+  constexpr int kReach = 4;
   for (int j = 0; j < next.rings; ++j) {
     for (int k = 0; k < next.sectors; ++k) {
       const std::size_t i = next.number(j, k);
-      if (filled[i]) continue;
-      ++counts.holes;
-      const std::size_t from = deepest_neighbour(next, filled, j, k);
-      // Nothing around it either: it stays as it was.
-      next.radiance[i] = from < size ? next.radiance[from] : now.radiance[i];
-      next.distance[i] = from < size ? next.distance[from] : now.distance[i];
+      const double hole = 1 - strata.covered[i];
+      if (hole > kRounding) {
+        ++counts.holes;
+        // What was there has left, so that what is seen now lies behind it.
+        std::size_t from = size;
+        const bool torn = strata.deepest[i] >= 0;
+        for (int reach = 1; reach <= (torn ? 1 : kReach); ++reach) {
+          from = strata.deepest_about(now, j, k, reach);
+          if (from < size && strata.deepest[from] > now.distance[i]) break;
+        }
+        // Nothing around it either: it stays as it was.
+        next.radiance[i] += (from < size ? strata.behind[from] : now.radiance[i]) * hole;
+        nearness[i] += hole / (from < size ? strata.deepest[from] : now.distance[i]);
+      }
+      next.distance[i] = 1 / nearness[i];
     }
   }
   if (report) *report = counts;

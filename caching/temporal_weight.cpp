@@ -28,20 +28,6 @@ double temporal_ratio(const RgbD& now, const RgbD& next) {
                    ratio_of(now.b, next.b, base)});
 }
 
-double temporal_ratio(std::span<const float> now, std::span<const float> next) {
-  double largest_now = 0, largest_next = 0, change = 0;
-  for (std::size_t i = 0; i < now.size(); ++i) {
-    const auto a = static_cast<double>(now[i]), b = static_cast<double>(next[i]);
-    if (!std::isfinite(a) || !std::isfinite(b)) return kMostRatio;
-    largest_now = std::max(largest_now, std::abs(a));
-    largest_next = std::max(largest_next, std::abs(b));
-    change = std::max(change, std::abs(b - a));
-  }
-  if (change == 0) return 1;
-  const double size = std::min(largest_now, largest_next);
-  return size * kMostRatio > change ? std::min(1 + change / size, kMostRatio) : kMostRatio;
-}
-
 double temporal_weight(double ratio, int age) {
   const double change = (ratio - 1) * age;
   return change * kMostWeight > 1 ? 1 / change : kMostWeight;

@@ -2,8 +2,6 @@
 
 #pragma once
 
-#include <span>
-
 #include "core/rgb.h"
 
 namespace haarlight {
@@ -20,12 +18,6 @@ struct TemporalAccuracy {
 /// where both are dark, at most kMostRatio, also for numbers that are none.
 inline constexpr double kMostRatio = 1e6;
 double temporal_ratio(const RgbD& now, const RgbD& next);
-
-/// The same for coefficients of incoming radiance: 1 plus the largest change of any, as a share of
-/// the largest coefficient. Equation 21 takes each as a share of itself; but coefficients have
-/// signs, any may be near 0 and would end the record, and what a picture shows of a change is in
-/// proportion to the largest, not to the one that changes.
-double temporal_ratio(std::span<const float> now, std::span<const float> next);
 
 /// 1 / ((ratio - 1) age) for a record that is `age` frames old (equation 9), capped at
 /// kMostWeight, which it has at age 0 and where nothing changes. Requires ratio >= 1, age >= 0.

@@ -162,6 +162,48 @@ TEST(RadianceRecord, LobesAreThoseOfTheBsdf) {
   }
 }
 
+TEST(RadianceRecord, ChangesCountWhereTheLobeLooks) {
+  const auto far = [](const Vec3&) { return kInfinite; };
+  const auto sky = [&](double here, double there) {
+    return lit(
+        2000, [&](const Vec3& w) { return w.z > 0.8 ? 1
+                                          : w.x > 0 ? here
+                                                    : there; }, far);
+  };
+  Bsdf bsdf;
+  bsdf.lobe = Bsdf::Lobe::ggx, bsdf.width = 0.2;
+  LobeHarmonics lobes;
+  const LobeView view{lobe_table_key(bsdf), normalize(Vec3{-1, 0, 0.8})};  // mirrors x > 0
+  lobes.make({view.table});
+  const RadianceValue now = sky(1, 1);
+  EXPECT_EQ(temporal_ratio(now, now, view, lobes), 1);
+  // Half of the light all over is a ratio of 2, either way.
+  EXPECT_NEAR(temporal_ratio(now, now * 0.5, view, lobes), 2, 1e-5);
+  EXPECT_NEAR(temporal_ratio(now * 0.5, now, view, lobes), 2, 1e-5);
+  const double here = temporal_ratio(now, sky(1.2, 1), view, lobes) - 1;
+  const double there = temporal_ratio(now, sky(1, 1.2), view, lobes) - 1;
+  // Nearly all of a lobe is on its own side; what the basis rings on the other is a few per cent.
+  EXPECT_GT(here, 0.1);
+  EXPECT_LT(here, 0.2 + 1e-3);
+  EXPECT_LT(there, 0.2 * here);
+  EXPECT_GE(temporal_ratio(now * 0, now, view, lobes), 100);
+  EXPECT_EQ(temporal_ratio(now * 0, now * 0, view, lobes), 1);
+}
+
+TEST(RadianceRecord, CoefficientsOfOtherLightAreThoseOfItsHemisphere) {
+  Hemisphere now = stratified_hemisphere(400, 5, true), then = now;
+  for (std::size_t i = 0; i < now.direction.size(); ++i) {
+    now.radiance[i] = then.radiance[i] = {1 + now.direction[i].x, 1, 2};
+    if (i % 7 == 0) then.radiance[i] = {0.2, 3, 0};
+  }
+  const RadianceValue found = coefficients_of(then, now, radiance_value(now));
+  const RadianceValue wanted = radiance_value(then);
+  for (std::size_t i = 0; i < 3 * kHarmonics; ++i) {
+    // Sums of 400 floats of at most 0.1 each.
+    EXPECT_NEAR(found.coefficient[i], wanted.coefficient[i], 1e-4) << i;
+  }
+}
+
 TEST(RadianceRecord, IsFollowedToPlacesNearby) {
   RadianceValue v = lit(
       2000, [](const Vec3& w) { return w.x > 0 ? 2.0 : 1.0; },

@@ -222,19 +222,6 @@ TEST(TemporalWeight, LivesAsLongAsItsChangeAllows) {
   EXPECT_NEAR(temporal_weight(1.25, 2), 2, 1e-12);
 }
 
-TEST(TemporalWeight, CoefficientsAreComparedWithTheLargest) {
-  const std::vector<float> now{2, 0, -0.5f}, fades{1, 0, -0.25f}, turns{2, 0.5f, 0.5f},
-      none{0, 0, 0};
-  EXPECT_EQ(temporal_ratio(std::span<const float>(now), now), 1);
-  EXPECT_NEAR(temporal_ratio(std::span<const float>(now), fades), 2, 1e-6);  // both ways
-  EXPECT_NEAR(temporal_ratio(std::span<const float>(fades), now), 2, 1e-6);
-  EXPECT_NEAR(temporal_ratio(std::span<const float>(now), turns), 1.5, 1e-6);
-  EXPECT_EQ(temporal_ratio(std::span<const float>(now), none), kMostRatio);
-  EXPECT_EQ(temporal_ratio(std::span<const float>(none), none), 1);
-  const std::vector<float> odd{std::numeric_limits<float>::quiet_NaN(), 0, 0};
-  EXPECT_EQ(temporal_ratio(std::span<const float>(now), odd), kMostRatio);
-}
-
 // A floor and a wall of next to no albedo under a lamp: what a place on the floor gets is the
 // lamp's light off the wall, in closed form at every direction.
 AnimatedFrame wall_frame(const Vec3& lamp, double wall_x) {
@@ -302,6 +289,62 @@ TEST(Reprojection, MovedWallIsSeenWhereItWillBe) {
   EXPECT_GT(std::abs(before - wanted), 0.05 * wanted);
   EXPECT_LT(std::abs(found - wanted), 0.25 * std::abs(before - wanted));
   EXPECT_GT(report.moved, 0);
+}
+
+// What a horizontal rectangle at `height` over a place takes of an irradiance of pi (Lambert's
+// formula): half the sum over its edges of the angle they are seen at times the cosine between the
+// normal and that of the plane through the place.
+double covered_by(double x0, double x1, double z0, double z1, double height) {
+  const Vec3 corner[] = {{x0, height, z0}, {x0, height, z1}, {x1, height, z1}, {x1, height, z0}};
+  double sum = 0;
+  for (int i = 0; i < 4; ++i) {
+    const Vec3 a = normalize(corner[i]), b = normalize(corner[(i + 1) % 4]);
+    sum += std::acos(dot(a, b)) * normalize(cross(a, b)).y / 2;
+  }
+  return std::abs(sum);
+}
+
+TEST(Reprojection, SmallStepsChangeLightByTheirShare) {
+  // A black board under a sky of 1, far off the zenith, so that its step changes what it hides: a
+  // step of some 2 degrees, a quarter of a stratum.
+  Scene scene = shapes::empty_scene();
+  shapes::add_quad(scene, {-3, 0, 3}, {6, 0, 0}, {0, 0, -6});
+  scene.material[0].albedo = {0, 0, 0};
+  AnimatedFrame now;
+  now.emission.resize(1), now.background = {1, 1, 1};
+  const double step = 0.06;
+  shapes::add_quad(scene, {0.5, 1, -0.7}, {1, 0, 0}, {0, 0, 1.4});
+  now.scene = scene;
+  AnimatedFrame next = now;
+  for (std::size_t v = 4; v < 8; ++v) next.scene.position[v].x -= step;
+  const BodyPlace place{0, 0, 0.5, true};  // the middle
+  const Vec3 at = place_in(now.scene, place).position;
+  const auto hidden = [&](double moved) {
+    return covered_by(0.5 - moved - at.x, 1.5 - moved - at.x, -0.7 - at.z, 0.7 - at.z, 1);
+  };
+  const double wanted = hidden(0) - hidden(step);
+  ASSERT_GT(std::abs(wanted), 0.02);
+  const FrameChange change(now, next);
+  const FrameTracer tracer(now);
+  constexpr int kRecords = 100;
+  double sum = 0, squares = 0;
+  for (std::uint64_t key = 0; key < kRecords; ++key) {
+    Hemisphere h = stratified_hemisphere(400, key);
+    std::vector<SeenPlace> seen;
+    gather_hemisphere(tracer, place_in(now.scene, place), key, h, &seen);
+    const double found = record_value(reprojected(h, seen, place, change)).irradiance.g -
+                         record_value(h).irradiance.g;
+    sum += found, squares += found * found;
+  }
+  const double mean = sum / kRecords;
+  const double spread = std::sqrt(squares / kRecords - mean * mean);
+  // Strata move whole: an edge is where its strata are, half a stratum's width of them not known,
+  // and they do not shrink as the board does by perspective: 10 % of the step's change.
+  EXPECT_NEAR(mean, wanted, 0.1 * std::abs(wanted) + 4 * spread / std::sqrt(kRecords));
+  // Whether a stratum at the edge is the board's is chance, but how far it moves is not: about 24
+  // strata along two edges, of which each is there or not, spread by some 1/sqrt(24). Samples that
+  // hop whole strata would spread by twice the change.
+  EXPECT_LT(spread, 0.5 * std::abs(wanted));
 }
 
 TEST(Reprojection, HolesGetTheLightOfTheirDeepestNeighbour) {
