@@ -3,7 +3,6 @@
 #include "caching/instant_cache.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <utility>
 
@@ -28,7 +27,7 @@ struct InstantCache::Counts {
 };
 
 InstantCache::InstantCache(const InstantCacheOptions& options)
-    : options_(options), octree_(empty_octree()) {}
+    : options_(options), fresh_(empty_octree()) {}
 
 // What a light adds to a record, by a ray through everything.
 PackedLight InstantCache::look(const MovingVisibility& scene, const Record& record,
@@ -63,15 +62,8 @@ void InstantCache::sum(std::size_t number) {
 }
 
 void InstantCache::drop(std::size_t number) {
-  record_[number].alive = false;
+  record_[number].alive = indexed_ = false;
   free_.push_back(static_cast<std::uint32_t>(number));
-}
-
-void InstantCache::index_all() {
-  octree_ = empty_octree();
-  for (std::uint32_t r = 0; r < record_.size(); ++r) {
-    if (record_[r].alive) octree_.insert(r, record_[r].position, record_[r].normal);
-  }
 }
 
 bool InstantCache::is_stale(std::size_t record) const {
@@ -89,7 +81,7 @@ void InstantCache::start_anew(const MovingVisibility& scene, std::vector<Virtual
   lights_ = std::move(lights);
   words_ = (lights_.size() + 63) / 64;
   record_.clear(), light_.clear(), stale_.clear(), free_.clear();
-  octree_ = empty_octree();
+  indexed_ = false;
 }
 
 void InstantCache::update(const MovingVisibility& scene, std::vector<VirtualLight> lights,
@@ -113,16 +105,15 @@ void InstantCache::update(const MovingVisibility& scene, std::vector<VirtualLigh
   }
   lights_ = std::move(lights);
   // Case 5, and records that nobody has asked for.
-  bool index_anew = false;
   for (std::size_t r = 0; r < record_.size(); ++r) {
     const Record& record = record_[r];
     if (!record.alive) continue;
     const bool rides = scene.moved(record.place.triangle);
     if (frame_ - record.used > options_.oldest || (rides && !options_.carry)) {
       drop(r);
-      ++report.records_dropped, index_anew = true;
+      ++report.records_dropped;
     } else if (rides) {
-      ++report.records_carried, index_anew = true;
+      ++report.records_carried, indexed_ = false;
     }
   }
   std::vector<Counts> counts(record_.size());
@@ -134,7 +125,6 @@ void InstantCache::update(const MovingVisibility& scene, std::vector<VirtualLigh
       },
       kRecordsAtOnce);
   for (const Counts& c : counts) c.add_to(report);
-  if (index_anew) index_all();
 }
 
 // Algorithm 1 for one record: cheap tests first. Whether any of its lights has changed.
@@ -245,7 +235,7 @@ std::uint32_t InstantCache::new_number(const BodyPlace& place, const MovingVisib
   record = {};
   record.place = place, record.alive = true, record.used = frame_;
   put(scene, record);
-  octree_.insert(number, record.position, record.normal);
+  indexed_ = false;
   return number;
 }
 
@@ -289,113 +279,6 @@ std::vector<PackedLight> InstantCache::from_scratch(const MovingVisibility& scen
   std::vector<PackedLight> out;
   for (const VirtualLight& light : lights_) out.push_back(look(scene, record, light, counts));
   return out;
-}
-
-// visit(number, 1 / w_k) of equation 5 for records nearer than `radius`, until one returns true.
-template <typename Visit>
-void InstantCache::visit_near(const SurfacePoint& point, double radius, const Visit& visit) const {
-  const auto px = static_cast<float>(point.position.x), py = static_cast<float>(point.position.y),
-             pz = static_cast<float>(point.position.z);
-  const auto nx = static_cast<float>(point.normal.x), ny = static_cast<float>(point.normal.y),
-             nz = static_cast<float>(point.normal.z);
-  const auto r = static_cast<float>(radius), per_unit = static_cast<float>(1 / options_.unit);
-  const float reach = r / per_unit, farthest = reach * reach, most_turn = r * r;
-  for (const NearbyOctree::Entry& e : octree_.near(point.position)) {
-    const float x = e.position[0] - px, y = e.position[1] - py, z = e.position[2] - pz;
-    const float square = x * x + y * y + z * z;
-    const float turn = 1 - (e.normal[0] * nx + e.normal[1] * ny + e.normal[2] * nz);
-    if (!(square < farthest) || !(turn < most_turn)) continue;
-    const float q = std::sqrt(square) * per_unit + std::sqrt(std::max(turn, 0.0f));
-    if (q < r && visit(e.number, static_cast<double>(q))) return;
-  }
-}
-
-bool InstantCache::covered(const SurfacePoint& point, double radius) const {
-  bool found = false;
-  visit_near(point, radius, [&](std::uint32_t, double) { return found = true; });
-  return found;
-}
-
-// All threads that write write the same.
-void InstantCache::use(std::uint32_t number) {
-  std::atomic_ref used(record_[number].used);
-  if (used.load(std::memory_order_relaxed) != frame_) {
-    used.store(frame_, std::memory_order_relaxed);
-  }
-}
-
-// New records for grids of pixels from coarse to fine; each grid asks for those of its pixels that
-// no coarser one has.
-void InstantCache::cover(const MovingVisibility& scene, std::span<const SurfaceRow> rows,
-                         InstantCacheReport& report) {
-  constexpr std::size_t kCoarse = 16;
-  std::vector<std::uint32_t> made;
-  std::vector<std::vector<const SurfacePoint*>> wanting(rows.size());
-  const double radius = options_.spacing * options_.radius;
-  for (std::size_t step = kCoarse; step >= 1; step /= 2) {
-    const int lines = static_cast<int>((rows.size() + step - 1) / step);
-    parallel_for(lines, [&](int line) {
-      const std::size_t y = static_cast<std::size_t>(line) * step;
-      auto& list = wanting[y];
-      list.clear();
-      const SurfaceRow& row = rows[y];
-      for (std::size_t x = 0; x + 1 < row.first.size(); x += step) {
-        if (step < kCoarse && y % (2 * step) == 0 && x % (2 * step) == 0) continue;
-        for (std::size_t i = row.first[x]; i < row.first[x + 1]; ++i) {
-          if (!covered(row.point[i], radius)) list.push_back(&row.point[i]);
-        }
-      }
-    });
-    for (std::size_t y = 0; y < rows.size(); y += step) {
-      for (const SurfacePoint* p : wanting[y]) {
-        if (!covered(*p, radius)) made.push_back(new_number(p->place, scene));
-      }
-    }
-  }
-  make(scene, made, report);
-}
-
-RgbD InstantCache::irradiance(const SurfacePoint& point) {
-  RgbD sum;
-  double weights = 0;
-  const double least = options_.fade ? 1 / options_.radius : 0;
-  visit_near(point, options_.radius, [&](std::uint32_t r, double q) {
-    use(r);
-    // At the record itself the weight has no end: its light alone counts.
-    const double w = std::max(1 / std::max(q, 1e-6) - least, 1e-9);
-    sum += record_[r].irradiance * w, weights += w;
-    return false;
-  });
-  return weights > 0 ? sum * (1 / weights) : RgbD{};
-}
-
-void InstantCache::gather(const MovingVisibility& scene, std::span<const SurfaceRow> rows,
-                          std::vector<std::vector<RgbD>>& irradiance_of,
-                          InstantCacheReport& report) {
-  cover(scene, rows, report);
-  if (options_.on_demand) {
-    parallel_for(static_cast<int>(rows.size()), [&](int y) {
-      for (const SurfacePoint& p : rows[static_cast<std::size_t>(y)].point) {
-        visit_near(p, options_.radius, [&](std::uint32_t r, double) {
-          use(r);
-          return false;
-        });
-      }
-    });
-    std::vector<std::uint32_t> waiting;
-    for (std::uint32_t r = 0; r < record_.size(); ++r) {
-      if (record_[r].alive && record_[r].used == frame_ && is_stale(r)) waiting.push_back(r);
-    }
-    refresh(scene, waiting, report);
-  }
-  irradiance_of.resize(rows.size());
-  parallel_for(static_cast<int>(rows.size()), [&](int line) {
-    const auto y = static_cast<std::size_t>(line);
-    irradiance_of[y].resize(rows[y].point.size());
-    for (std::size_t i = 0; i < rows[y].point.size(); ++i) {
-      irradiance_of[y][i] = irradiance(rows[y].point[i]);
-    }
-  });
 }
 
 }  // namespace haarlight

@@ -10,6 +10,8 @@
 #include "caching/moving_visibility.h"
 #include "caching/nearby_octree.h"
 #include "caching/packed_light.h"
+#include "caching/record_blocks.h"
+#include "caching/record_index.h"
 #include "caching/surface_points.h"
 #include "caching/virtual_lights.h"
 
@@ -98,14 +100,10 @@ class InstantCache {
   void sum(std::size_t number);
   std::uint32_t new_number(const BodyPlace& place, const MovingVisibility& scene);
   void drop(std::size_t number);
-  void index_all();
-  template <typename Visit>
-  void visit_near(const SurfacePoint& point, double radius, const Visit& visit) const;
-  bool covered(const SurfacePoint& point, double radius) const;
-  void cover(const MovingVisibility& scene, std::span<const SurfaceRow> rows,
-             InstantCacheReport& report);
+  RecordIndex::Entry entry(std::uint32_t number) const;
+  bool covered(const SurfacePoint& point) const;
+  std::vector<std::uint32_t> cover(const MovingVisibility& scene, std::span<const SurfaceRow> rows);
   void use(std::uint32_t number);
-  RgbD irradiance(const SurfacePoint& point);
   NearbyOctree empty_octree() const { return {2, options_.radius * options_.unit}; }
 
   InstantCacheOptions options_;
@@ -117,8 +115,11 @@ class InstantCache {
   std::vector<std::uint64_t> stale_;  // a bit a light, words_ a record
   std::vector<std::uint32_t> free_;   // numbers that are not alive, those to take first last
   std::size_t words_ = 0;
-  int frame_ = 0;  // counts updates
-  NearbyOctree octree_;
+  int frame_ = 0;      // counts updates
+  RecordIndex index_;  // of all that are alive, where indexed_
+  bool indexed_ = false;
+  NearbyOctree fresh_;                       // those that this picture has made
+  std::vector<std::vector<RecordSum>> sum_;  // by row and point of this picture
 };
 
 }  // namespace haarlight

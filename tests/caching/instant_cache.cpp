@@ -147,7 +147,8 @@ TEST(InstantCache, InterpolationOfEvenLightIsExact) {
   const double first = irradiance[24][0].g;
   for (const auto& row : irradiance) {
     for (const RgbD& e : row) {
-      EXPECT_NEAR(e.g, first, 1e-12 * first);
+      // Sums of some ten floats, eight lanes at a time.
+      EXPECT_NEAR(e.g, first, 1e-6 * first);
       ++points;
     }
   }
