@@ -2,6 +2,7 @@
 
 #include "precompute/scene_import.h"
 
+#include <assimp/BaseImporter.h>
 #include <assimp/material.h>
 #include <assimp/mesh.h>
 #include <assimp/scene.h>
@@ -12,6 +13,8 @@
 #include <cctype>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <set>
 #include <span>
 #include <string>
 
@@ -44,6 +47,18 @@ std::string one_line(std::string text) {
       text.begin(), text.end(), [](unsigned char c) { return std::iscntrl(c) != 0; }, ' ');
   while (!text.empty() && (text.back() == ' ' || text.back() == '.')) text.pop_back();
   return text.empty() ? "no reason given" : text;
+}
+
+// Leaves the readers of one suffix. Left to itself assimp lets each of its fifty have a go at a
+// file that no reader of its suffix wants, and some of them do not bear damaged bytes.
+void keep_readers_of(const std::string& suffix, Assimp::Importer& importer) {
+  for (std::size_t i = importer.GetImporterCount(); i-- > 0;) {
+    std::set<std::string> suffixes;
+    importer.GetImporter(i)->GetExtensionList(suffixes);
+    if (suffixes.contains(suffix)) continue;
+    const std::unique_ptr<Assimp::BaseImporter> left_out(importer.GetImporter(i));
+    importer.UnregisterLoader(left_out.get());
+  }
 }
 
 float unit(float value) { return value > 0 ? std::min(value, 1.0f) : 0.0f; }  // NaN becomes 0
@@ -263,6 +278,10 @@ Scene import_scene(const std::filesystem::path& file) {
 
   // No post-processing: what it drops or alters it does not say.
   Assimp::Importer importer;
+  keep_readers_of(type == FileType::gltf  ? "gltf"
+                  : type == FileType::obj ? "obj"
+                                          : "ply",
+                  importer);
   const aiScene* read = importer.ReadFile(file.string(), 0);
   if (!read || !read->mRootNode) {
     throw Error(ErrorKind::format, fmt::format("{}: cannot be read as a scene ({}), expected a "

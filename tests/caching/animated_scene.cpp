@@ -20,6 +20,7 @@
 #include "core/error.h"
 #include "core/image_io.h"
 #include "data_gen/animations.h"
+#include "tests/caching/small_gltf.h"
 
 namespace haarlight {
 namespace {
@@ -33,74 +34,13 @@ std::filesystem::path scratch(const std::string& name) {
   return folder / name;
 }
 
-// One triangle on a node that two clips move, a camera, a spot light and a morph target.
-struct SmallGltf {
-  json gltf;
-  std::string bytes;
-
-  std::size_t add(const std::vector<float>& values, const char* type, std::size_t width) {
-    const std::size_t begin = bytes.size();
-    bytes.resize(begin + values.size() * sizeof(float));
-    std::memcpy(bytes.data() + begin, values.data(), values.size() * sizeof(float));
-    gltf["bufferViews"].push_back(
-        {{"buffer", 0}, {"byteOffset", begin}, {"byteLength", values.size() * sizeof(float)}});
-    json accessor{{"bufferView", gltf["bufferViews"].size() - 1},
-                  {"componentType", 5126},
-                  {"count", values.size() / width},
-                  {"type", type}};
-    gltf["accessors"].push_back(accessor);
-    return gltf["accessors"].size() - 1;
-  }
-
-  SmallGltf() {
-    gltf["asset"]["version"] = "2.0";
-    const auto position = add({0, 0, 0, 1, 0, 0, 0, 1, 0}, "VEC3", 3);
-    const auto morph = add({0, 0, 2, 0, 0, 0, 0, 0, 0}, "VEC3", 3);
-    const auto time = add({0, 1}, "SCALAR", 1);
-    const auto move = add({0, 0, 0, 4, 0, 0}, "VEC3", 3);
-    const float half = std::sqrt(0.5f);
-    const auto turn = add({0, 0, 0, 1, 0, 0, half, half}, "VEC4", 4);
-    const auto weight = add({0, 1}, "SCALAR", 1);
-    const auto glow = add({0, 0, 0, 1, 1, 0.5f}, "VEC3", 3);
-    gltf["materials"] = json::array({{{"name", "paint"}}});
-    gltf["meshes"] = json::array(
-        {{{"primitives", json::array({{{"attributes", {{"POSITION", position}}},
-                                       {"material", 0},
-                                       {"targets", json::array({{{"POSITION", morph}}})}}})}}});
-    gltf["cameras"] =
-        json::array({{{"type", "perspective"}, {"perspective", {{"yfov", 0.8}, {"znear", 0.1}}}}});
-    gltf["extensions"]["KHR_lights_punctual"]["lights"] =
-        json::array({{{"type", "spot"}, {"intensity", 3}, {"color", {1, 0.5, 0.25}}}});
-    json lamp{{"translation", {0, 5, 0}}};
-    lamp["extensions"]["KHR_lights_punctual"]["light"] = 0;
-    gltf["nodes"] = json::array(
-        {{{"children", {1}}}, {{"mesh", 0}}, {{"camera", 0}, {"translation", {0, 0, 9}}}, lamp});
-    gltf["scenes"] = json::array({{{"nodes", {0, 2, 3}}}});
-    gltf["scene"] = 0;
-    const auto sampler = [&](std::size_t output) {
-      return json{{"input", time}, {"output", output}};
-    };
-    json pointed{{"path", "pointer"}};
-    pointed["extensions"]["KHR_animation_pointer"]["pointer"] = "/materials/0/emissiveFactor";
-    gltf["animations"] =
-        json::array({{{"samplers", {sampler(move), sampler(weight)}},
-                      {"channels",
-                       {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}},
-                        {{"sampler", 1}, {"target", {{"node", 1}, {"path", "weights"}}}}}}},
-                     {{"samplers", {sampler(turn), sampler(glow)}},
-                      {"channels",
-                       {{{"sampler", 0}, {"target", {{"node", 1}, {"path", "rotation"}}}},
-                        {{"sampler", 1}, {"target", pointed}}}}}});
-  }
-
-  std::filesystem::path write(const std::string& name) {
-    std::ofstream(scratch(name + ".bin"), std::ios::binary) << bytes;
-    gltf["buffers"] = json::array({{{"uri", name + ".bin"}, {"byteLength", bytes.size()}}});
-    const auto file = scratch(name + ".gltf");
-    std::ofstream(file) << gltf.dump();
-    return file;
-  }
-};
+std::filesystem::path written(SmallGltf file, const std::string& name) {
+  std::ofstream(scratch(name + ".bin"), std::ios::binary) << file.bytes;
+  file.gltf["buffers"] = json::array({{{"uri", name + ".bin"}, {"byteLength", file.bytes.size()}}});
+  const auto path = scratch(name + ".gltf");
+  std::ofstream(path) << file.gltf.dump();
+  return path;
+}
 
 void expect_near(const Vec3& found, const Vec3& wanted) {
   // Keys are floats: 2^-24 of numbers up to 4, a few operations on them.
@@ -108,7 +48,7 @@ void expect_near(const Vec3& found, const Vec3& wanted) {
 }
 
 TEST(AnimatedScene, NodesClipsMorphsLightsAndMaterialsMoveTogether) {
-  const AnimatedScene scene(SmallGltf().write("small"), 2);  // half a second a frame
+  const AnimatedScene scene(written(SmallGltf(), "small"), 2);  // half a second a frame
   EXPECT_EQ(scene.frames(), 3);
   ASSERT_EQ(scene.triangle_count(), 1u);
   EXPECT_EQ(scene.instance_of(0), 1u);
@@ -197,7 +137,7 @@ TEST(AnimatedScene, APictureBehindEverythingTurnsByKeys) {
       "/scenes/0/extras/haarlight/environment/rotation";
   file.gltf["animations"].push_back({{"samplers", {{{"input", time}, {"output", turn}}}},
                                      {"channels", {{{"sampler", 0}, {"target", pointed}}}}});
-  const AnimatedScene scene(file.write("sky"), 2);  // half a second a frame
+  const AnimatedScene scene(written(file, "sky"), 2);  // half a second a frame
   // A quarter turn a frame about +Y: from +X to -Z and to -X.
   const Vec3 where[] = {{1, 0, 0}, {0, 0, -1}, {-1, 0, 0}};
   for (int frame = 0; frame < 3; ++frame) {
@@ -209,11 +149,11 @@ TEST(AnimatedScene, APictureBehindEverythingTurnsByKeys) {
     }
   }
   file.gltf["scenes"][0]["extras"]["haarlight"]["environment"] = {{"uri", "nowhere.exr"}};
-  EXPECT_THROW(AnimatedScene(file.write("no sky")), Error);
+  EXPECT_THROW(AnimatedScene(written(file, "no sky")), Error);
 }
 
 TEST(AnimatedScene, WhatAPersonCarriesStaysThere) {
-  AnimatedScene scene(SmallGltf().write("carried"), 2);
+  AnimatedScene scene(written(SmallGltf(), "carried"), 2);
   const AnimatedFrame before = scene.at(1);
   // Node 1, the triangle, hangs on node 0; node 3 is the lamp.
   scene.carry(0, {0, 1, 0});
@@ -238,7 +178,7 @@ TEST(AnimatedScene, WhatAPersonCarriesStaysThere) {
 TEST(AnimatedScene, WrongAnimationsAreRefusedByName) {
   const auto refused = [](SmallGltf& file, const std::string& name) {
     try {
-      const AnimatedScene scene(file.write(name));
+      const AnimatedScene scene(written(file, name));
       return std::string();
     } catch (const Error& error) {
       return std::string(error.what());

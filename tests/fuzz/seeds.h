@@ -12,6 +12,7 @@
 #include "core/image_io.h"
 #include "prt/motion_file.h"
 #include "prt/transport_writer.h"
+#include "tests/caching/small_gltf.h"
 #include "tests/core/temporary_folder.h"
 #include "tests/prt/fixtures.h"
 
@@ -115,6 +116,9 @@ inline std::vector<std::string> scene_seeds() {
           std::string(1, '\3') + ply, std::string(1, '\3') + binary};
 }
 
+/// Clips of every kind on one triangle.
+inline std::vector<std::string> animation_seeds() { return {SmallGltf().glb()}; }
+
 inline std::vector<std::string> api_seeds() {
   std::mt19937 random(5);
   std::vector<std::string> seeds(8);
@@ -125,9 +129,13 @@ inline std::vector<std::string> api_seeds() {
 }
 
 inline std::map<std::string, std::vector<std::string>> all_seeds() {
-  return {{"transport", transport_seeds()}, {"journal", transport_seeds(true)},
-          {"recording", recording_seeds()}, {"environment", environment_seeds()},
-          {"scene", scene_seeds()},         {"api", api_seeds()}};
+  return {{"transport", transport_seeds()},
+          {"journal", transport_seeds(true)},
+          {"recording", recording_seeds()},
+          {"environment", environment_seeds()},
+          {"scene", scene_seeds()},
+          {"animation", animation_seeds()},
+          {"api", api_seeds()}};
 }
 
 }  // namespace haarlight::fuzz

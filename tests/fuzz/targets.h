@@ -37,6 +37,8 @@ Outcome recording(Bytes bytes);
 Outcome environment(Bytes bytes);
 /// A scene: imported with its clean-up and materials. The first byte chooses GLB, glTF, OBJ or PLY.
 Outcome scene(Bytes bytes);
+/// A scene that moves, as GLB: read, and taken at its first frame, its last and one far beyond.
+Outcome animation(Bytes bytes);
 /// Calls of the library with numbers of any kind: trackers, sums, relighters, cameras,
 /// environments. The bytes say which and with what.
 Outcome api(Bytes bytes);

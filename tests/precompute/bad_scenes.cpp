@@ -250,6 +250,16 @@ TEST_F(BadScenes, PlyListsLongerThanTheFile) {
   }
 }
 
+// assimp has fifty readers, some of which find their own in the text below: glTF without a version
+// is nobody's, and no scene of another format is made of it.
+TEST_F(BadScenes, OnlyReadersOfTheSuffixAreAsked) {
+  for (const char* name : {"a.gltf", "a.glb"}) {
+    const std::string said =
+        refusal(name, R"({"extras": ["mtllib usemtl v vt vn f", "<x3d>", "<collada", "solid "]})");
+    EXPECT_NE(said.find("No suitable reader"), std::string::npos) << said;
+  }
+}
+
 // A glTF file of nodes, and of a mesh of two triangles in data.bin.
 std::string gltf(const std::string& nodes) {
   return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[)" + nodes +
