@@ -16,6 +16,7 @@ What has been seen is kept in planted.json of the tree, with hashes of the sourc
 """
 
 import argparse
+import fnmatch
 import hashlib
 import json
 import re
@@ -124,10 +125,17 @@ class Build:
         return self.command(["cmake", "--build", str(self.folder), "-j", str(self.jobs), "--target",
                              *targets], must=must)
 
-    def list_tests(self, binary, pattern):
-        listed = self.command([str(self.folder / "bin" / binary), "--gtest_list_tests",
-                               f"--gtest_filter={pattern}"], must=True).stdout
-        return [line for line in listed.splitlines() if line.startswith("  ")]
+    def list_tests(self, binary):
+        """What a binary's tests are called."""
+        listed = self.command([str(self.folder / "bin" / binary), "--gtest_list_tests"],
+                              must=True).stdout
+        suite, names = "", []
+        for line in listed.splitlines():
+            if line.startswith("  "):
+                names.append(suite + line.split("#")[0].strip())
+            elif line.split("#")[0].strip().endswith("."):
+                suite = line.split("#")[0].strip()
+        return names
 
     def passes(self, binary, pattern):
         try:
@@ -199,9 +207,11 @@ def main():
     seen = Seen(tree, options.resume)
     build = Build(tree, options.jobs, shlex.split(options.prefix), shlex.split(options.cmake))
     build.make(*build.binaries, must=True)
+    tests = {binary: build.list_tests(binary) for binary in build.binaries}
     placed = []
     for fault in faults:
-        binary = next((b for b in build.binaries if build.list_tests(b, fault.red)), None)
+        binary = next((b for b in build.binaries if any(fnmatch.fnmatchcase(name, fault.red)
+                                                        for name in tests[b])), None)
         if not binary:
             sys.exit(f"{fault.path}: no test is called {fault.red}")
         placed.append((fault, binary))

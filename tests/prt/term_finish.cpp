@@ -136,6 +136,39 @@ TEST(TermFinish, HugeAndTinyNumbersStayFinite) {
   }
 }
 
+// Fills the stack below with NaN, for what reads it before it has written there.
+[[gnu::noinline]] float stack_of_nans() {
+  volatile float nans[16384];
+  for (volatile float& x : nans) x = std::numeric_limits<float>::quiet_NaN();
+  return nans[9999];
+}
+
+// A dark term between two that are not has an order, too, and it may be the highest: 0 times the
+// cosine of it must be 0.
+TEST(TermFinish, DarkTermsOfTheHighestOrderAreDark) {
+  const int threads = thread_count();
+  set_thread_count(1);  // this one's stack
+  SmallTransport small = transport_with_factors(60, 3, 12);
+  ViewFactors factors;
+  factors.terms = 3, factors.resolution = 2;
+  factors.order = {0, -40, 1};
+  factors.profile = {{1, 1, 1}, {1, 1, 1}, {}, {}, {0, 0, 0}, {2, 2, 2}};
+  const std::size_t vertices = small.info.mesh->position.size();
+  factors.set_of.assign(vertices, 0);
+  TermFinish finish(small.info.mesh, std::make_shared<const ViewFactors>(factors));
+  const std::vector<Rgb> sums(3 * vertices, Rgb{1, 1, 1});
+  std::vector<Rgb> radiance(vertices);
+  ASSERT_TRUE(std::isnan(stack_of_nans()));
+  finish.look({0, 9, 0});
+  finish.shade(sums, radiance);
+  for (std::size_t v = 0; v < vertices; ++v) {
+    ASSERT_TRUE(is_finite(radiance[v])) << v;
+    ASSERT_LE(std::abs(radiance[v].r - 1), 2.001f) << v;
+    ASSERT_EQ(finish.factors()[3 * v + 1], Rgb{}) << v;
+  }
+  set_thread_count(threads);
+}
+
 TEST(TermFinish, SameBitsOnAnyNumberOfThreads) {
   const SmallTransport small = transport_with_factors(4000, 4, 13);
   const Transport transport = build_transport(small.info, small.tiles, small.thresholds);
