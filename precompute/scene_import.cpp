@@ -21,7 +21,7 @@
 #include "core/error.h"
 #include "precompute/gltf_extras.h"
 #include "precompute/material_import.h"
-#include "precompute/ply_check.h"
+#include "precompute/plain_ply.h"
 #include "precompute/polygon.h"
 #include "precompute/scene_clean.h"
 #include "precompute/texture_import.h"
@@ -273,16 +273,21 @@ Scene import_scene(const std::filesystem::path& file) {
   }
   GltfExtras extras;
   if (type == FileType::gltf) extras = read_gltf_extras(file);
-  // First: the reader takes the room that the file asks for before it looks for the data.
-  if (type == FileType::ply) check_ply_length(file);
-
   // No post-processing: what it drops or alters it does not say.
   Assimp::Importer importer;
   keep_readers_of(type == FileType::gltf  ? "gltf"
                   : type == FileType::obj ? "obj"
                                           : "ply",
                   importer);
-  const aiScene* read = importer.ReadFile(file.string(), 0);
+  std::string plain;
+  const aiScene* read = nullptr;
+  if (type == FileType::ply) {
+    plain = plain_ply(file);
+    read = importer.ReadFileFromMemory(plain.data(), plain.size(), 0, "ply");
+    plain = {};
+  } else {
+    read = importer.ReadFile(file.string(), 0);
+  }
   if (!read || !read->mRootNode) {
     throw Error(ErrorKind::format, fmt::format("{}: cannot be read as a scene ({}), expected a "
                                                "glTF, OBJ or PLY file",

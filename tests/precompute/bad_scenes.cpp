@@ -4,10 +4,12 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/error.h"
@@ -247,6 +249,72 @@ TEST_F(BadScenes, PlyListsLongerThanTheFile) {
           refusal("e.ply", ply(format, "int", places + number(length, big) + face));
       EXPECT_NE(said.find("e.ply: face 0 has a list of"), std::string::npos) << said;
     }
+  }
+}
+
+// What the reader of PLY in use would lose, or write past its arrays for.
+TEST_F(BadScenes, PlyAsItsReaderDoesNotExpectIt) {
+  const std::string corners = "0 0 0\n1 0 0\n0 0 1\n", head = "ply\nformat ascii 1.0\n";
+  const std::string places = "property float x\nproperty float y\nproperty float z\n";
+  const std::string vertex = "element vertex 3\n" + places;
+  const std::string list = "property list uchar int vertex_indices\n", end = "end_header\n";
+  const std::string face = "element face 1\n" + list;
+
+  // Read: comments between properties, elements of other kinds, faces first, blank lines, ends of
+  // line of other systems, exponents and signs.
+  const std::string three = corners + "3 0 2 1\n";
+  for (const std::string& text :
+       {head + "comment a\nelement vertex 3\nproperty float x\ncomment b\nproperty float y\n" +
+            "property float z\nelement face 1\ncomment c\n" + list + end + three,
+        head + vertex + "element edge 2\nproperty int a\nproperty int b\n" + face + end + corners +
+            "0 1\n1 2\n3 0 2 1\n",
+        head + face + vertex + end + "3 0 2 1\n" + corners,
+        head + vertex + face + end + "\n0 0 0\r\n\n1e0 0 -0.0\n+0 0 1 \n\n3 0 2e0 +1",
+        "ply\r\nformat ascii 1.0\r\nobj_info x\r\n" + vertex + face + end + three}) {
+    EXPECT_EQ(import("a.ply", text).triangle.size(), 1u) << text;
+  }
+  // The first number's first byte is that of an end of line.
+  const float odd = std::bit_cast<float>(0x3f80000au), one = 1, zero = 0;
+  std::string bytes;
+  for (const float x : {odd, zero, zero, zero, zero, one, zero, one, zero}) {
+    bytes.append(reinterpret_cast<const char*>(&x), sizeof x);
+  }
+  bytes += '\3' + std::string("\0\0\0\0\1\0\0\0\2\0\0\0", 12);
+  const Scene lf =
+      import("b.ply", "ply\nformat binary_little_endian 1.0\n" + vertex + face + end + bytes);
+  ASSERT_EQ(lf.triangle.size(), 1u);
+  EXPECT_EQ(lf.position[lf.triangle[0].vertex[0]].x, static_cast<double>(odd));
+
+  const std::string twice = "element face 2\n" + list;
+  const std::string coordinates = "property list uchar float texcoord\n";
+  const std::pair<std::string, const char*> refused[] = {
+      {head + vertex + face + twice + end + corners + "3 0 2 1\n3 0 2 1\n3 0 2 1\n",
+       "element face comes twice"},
+      {head + vertex + "element vertex 9\n" + places + face + end + corners + corners + corners,
+       "element vertex comes twice"},
+      {head + vertex + face + coordinates + end + corners + "2 0 1 6 0 0 1 0 0 1\n",
+       "face 0 has 6 texture coordinates for 2 corners"},
+      {head + vertex + "element face 1\n" + coordinates + end + corners + "6 0 0 1 0 0 1\n",
+       "face 0 has 6 texture coordinates for 0 corners"},
+      {head + vertex + "element tristrips 1\n" + list + end + three, "strips"},
+      {head + "element vertex 4000000000\nend_header\n", "has no properties"},
+      {head + face + end + "3 0 2 1\n", "no element vertex"},
+      {head + vertex + "element face 1\nproperty list float int vertex_indices\n" + end + three,
+       "lengths of a list are of type \"float\""},
+      {head + vertex + "element face 1\nproperty list uchar bit vertex_indices\n" + end + three,
+       "unknown type \"bit\""},
+      {head + vertex + "element face -1\n" + list + end + three, "count of \"-1\""},
+      {head + vertex + face + end + "0 0\n1 0 0\n0 0 1\n3 0 2 1\n", "vertex 0 has too few numbers"},
+      {head + vertex + face + end + "0 0 0\n1 0 zero\n0 0 1\n3 0 2 1\n",
+       "vertex 1 has \"zero\" in place of a number"},
+      {head + vertex + face + end + corners + "3 0 2 3e9\n", "face 0 has 3000000000, expected"},
+      {"ply\n" + vertex + face + end + three, "names no format"},
+      {"ply\nformat text 1.0\n" + vertex + face + end + three, "format is \"text\""},
+      {"plys\nformat ascii 1.0\n" + vertex + face + end + three, "does not begin with"}};
+  for (const auto& [text, why] : refused) {
+    const std::string said = refusal("c.ply", text);
+    EXPECT_NE(said.find(why), std::string::npos) << said << "\n" << text;
+    EXPECT_EQ(said.find("c.ply: "), folder_.path().string().size() + 1) << said;
   }
 }
 
