@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/error.h"
@@ -186,15 +187,21 @@ std::int64_t promised_triangles(const json& file, const std::set<std::size_t>& m
   return all;
 }
 
-// The JSON text: the whole .gltf, or the first chunk of a .glb.
-std::string json_text(const std::filesystem::path& file) {
+// A file's parts: the JSON is the whole .gltf, or the first chunk of a .glb; then come a .glb's
+// other chunks.
+struct Contents {
+  std::string json, chunks;
+  bool glb = false;
+};
+constexpr std::size_t kHeader = 12, kChunkHeader = 8;  // bytes; glTF 2.0, section 4.4
+
+Contents read_contents(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) {
     throw Error(ErrorKind::io, fmt::format("{}: cannot be opened for reading", file.string()));
   }
   std::string bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  if (!bytes.starts_with("glTF")) return bytes;
-  constexpr std::size_t kHeader = 12, kChunkHeader = 8;
+  if (!bytes.starts_with("glTF")) return {std::move(bytes), {}, false};
   std::uint32_t size = 0, version = 0;
   if (bytes.size() < kHeader + kChunkHeader) return {};
   std::memcpy(&version, bytes.data() + 4, sizeof version);
@@ -206,25 +213,50 @@ std::string json_text(const std::filesystem::path& file) {
   if (bytes.compare(kHeader + 4, 4, "JSON") != 0 || size > bytes.size() - kHeader - kChunkHeader) {
     return {};
   }
-  return bytes.substr(kHeader + kChunkHeader, size);
+  const std::size_t end = kHeader + kChunkHeader + (std::size_t{size} + 3) / 4 * 4;
+  Contents out{bytes.substr(kHeader + kChunkHeader, size), {}, true};
+  if (end < bytes.size()) out.chunks = bytes.substr(end);
+  return out;
+}
+
+std::string without_motion(json file, const Contents& contents) {
+  file.erase("animations");
+  file.erase("skins");
+  if (file.contains("nodes")) {
+    for (json& node : file.at("nodes")) {
+      if (node.is_object()) node.erase("skin");
+    }
+  }
+  std::string text = file.dump(-1, ' ', false, json::error_handler_t::replace);
+  if (!contents.glb) return text;
+  while (text.size() % 4 != 0) text += ' ';
+  const auto word = [](std::size_t value) {
+    const auto bits = static_cast<std::uint32_t>(value);
+    return std::string(reinterpret_cast<const char*>(&bits), sizeof bits);
+  };
+  return "glTF" + word(2) + word(kHeader + kChunkHeader + text.size() + contents.chunks.size()) +
+         word(text.size()) + "JSON" + text + contents.chunks;
 }
 
 }  // namespace
 
 GltfExtras read_gltf_extras(const std::filesystem::path& file) {
   try {
-    const std::string text = json_text(file);
-    if (json_nests_too_deep(text)) {
+    const Contents contents = read_contents(file);
+    if (json_nests_too_deep(contents.json)) {
       throw Error(ErrorKind::format,
                   fmt::format("{}: its JSON nests deeper than {}, expected glTF 2.0", file.string(),
                               kMostJsonDepth));
     }
-    const json parsed = json::parse(text);
+    const json parsed = json::parse(contents.json);
     GltfExtras extras;
     extras.material = gltf_materials(parsed);
     const std::set<std::size_t> meshes = meshes_in_scene(parsed, file.string());
     extras.triangles = promised_triangles(parsed, meshes);
     extras.camera = find_camera(parsed);
+    if (parsed.contains("animations") || parsed.contains("skins")) {
+      extras.still = without_motion(parsed, contents);
+    }
     return extras;
   } catch (const json::exception&) {
     throw Error(ErrorKind::format,

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "core/camera.h"
@@ -17,6 +18,9 @@ struct GltfExtras {
   std::optional<Camera> camera;  ///< the first perspective camera that a node of the scene carries
   std::int64_t triangles = 0;  ///< that the meshes in the scene promise, each mesh once; the reader
                                ///< leaves those out that name vertices that are not there
+  /// The same file without animations and skins, over some of which the reader falls (keys of an
+  /// animation that has none, joints of a skin that are not there); empty where it has neither.
+  std::string still;
   std::vector<GltfMaterial> material;  ///< of the file; the reader adds a default one behind them
 };
 

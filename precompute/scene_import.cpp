@@ -3,6 +3,8 @@
 #include "precompute/scene_import.h"
 
 #include <assimp/BaseImporter.h>
+#include <assimp/DefaultIOSystem.h>
+#include <assimp/MemoryIOWrapper.h>
 #include <assimp/material.h>
 #include <assimp/mesh.h>
 #include <assimp/scene.h>
@@ -12,11 +14,13 @@
 #include <assimp/Importer.hpp>
 #include <cctype>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <set>
 #include <span>
 #include <string>
+#include <utility>
 
 #include "core/error.h"
 #include "precompute/gltf_extras.h"
@@ -60,6 +64,21 @@ void keep_readers_of(const std::string& suffix, Assimp::Importer& importer) {
     importer.UnregisterLoader(left_out.get());
   }
 }
+
+// Files as they are, but for one whose bytes are others. They must outlive it.
+class InPlaceOf : public Assimp::DefaultIOSystem {
+ public:
+  InPlaceOf(std::string file, const std::string& bytes) : file_(std::move(file)), bytes_(bytes) {}
+  Assimp::IOStream* Open(const char* file, const char* mode) override {
+    if (file != file_) return DefaultIOSystem::Open(file, mode);
+    return new Assimp::MemoryIOStream(reinterpret_cast<const std::uint8_t*>(bytes_.data()),
+                                      bytes_.size());
+  }
+
+ private:
+  std::string file_;
+  const std::string& bytes_;
+};
 
 float unit(float value) { return value > 0 ? std::min(value, 1.0f) : 0.0f; }  // NaN becomes 0
 template <typename Color>
@@ -279,15 +298,10 @@ Scene import_scene(const std::filesystem::path& file) {
                   : type == FileType::obj ? "obj"
                                           : "ply",
                   importer);
-  std::string plain;
-  const aiScene* read = nullptr;
-  if (type == FileType::ply) {
-    plain = plain_ply(file);
-    read = importer.ReadFileFromMemory(plain.data(), plain.size(), 0, "ply");
-    plain = {};
-  } else {
-    read = importer.ReadFile(file.string(), 0);
-  }
+  // What the reader would fall over is left out before it sees it.
+  if (type == FileType::ply) extras.still = plain_ply(file);
+  if (!extras.still.empty()) importer.SetIOHandler(new InPlaceOf(file.string(), extras.still));
+  const aiScene* read = importer.ReadFile(file.string(), 0);
   if (!read || !read->mRootNode) {
     throw Error(ErrorKind::format, fmt::format("{}: cannot be read as a scene ({}), expected a "
                                                "glTF, OBJ or PLY file",

@@ -19,6 +19,7 @@
 #include "precompute/scene_clean.h"
 #include "precompute/scene_import.h"
 #include "prt/transport.h"
+#include "tests/caching/small_gltf.h"
 #include "tests/core/temporary_folder.h"
 #include "tests/precompute/shapes.h"
 
@@ -367,6 +368,19 @@ TEST_F(BadScenes, NodesThatAreNoTree) {
   const Scene one_left = import("f.gltf", gltf(mesh));
   EXPECT_EQ(one_left.triangle.size(), 1u);
   EXPECT_EQ(one_left.report.dropped_out_of_range, 1);
+}
+
+// assimp divides by the number of an animation's keys, and takes joints as they come. A scene that
+// stands still has no use for either.
+TEST_F(BadScenes, MotionIsNotReadForAScene) {
+  SmallGltf moving;
+  moving.gltf["accessors"][2]["count"] = 0;
+  moving.gltf["skins"] = {{{"joints", {77}}, {"inverseBindMatrices", 99}}};
+  moving.gltf["nodes"][1]["skin"] = 0;
+  EXPECT_EQ(import("a.glb", moving.glb()).triangle.size(), 1u);
+  moving.gltf["buffers"][0]["uri"] = "a.bin";
+  write_bytes(folder_.path() / "a.bin", moving.bytes);
+  EXPECT_EQ(import("a.gltf", moving.gltf.dump()).triangle.size(), 1u);
 }
 
 }  // namespace
