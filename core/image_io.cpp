@@ -13,6 +13,7 @@
 #include <cerrno>
 #include <cmath>
 #include <cstdint>
+#include <exception>
 #include <fstream>
 #include <memory>
 #include <string>
@@ -160,6 +161,55 @@ void check_complete(const fs::path& file, const OIIO::ImageInput& input, bool su
   fail(ErrorKind::format, file, "is cut short or damaged: " + one_line(input.geterror()));
 }
 
+// What readers throw of themselves, of damaged files, becomes an error of ours.
+template <typename Read>
+auto guarded(const fs::path& file, const Read& read) {
+  try {
+    return read();
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& error) {
+    fail(ErrorKind::format, file, "is cut short or damaged: " + one_line(error.what()));
+  }
+}
+
+Image load(const fs::path& file, ImageEncoding encoding) {
+  const auto input = open_input(file);
+  const OIIO::ImageSpec spec = input->spec();
+  Image image(spec.width, spec.height);
+  bool complete = true;
+  if (spec.nchannels >= 3) {
+    complete = input->read_image(0, 0, 0, 3, OIIO::TypeDesc::FLOAT, image.pixels.data());
+  } else {
+    std::vector<float> grey(image.pixels.size());
+    complete = input->read_image(0, 0, 0, 1, OIIO::TypeDesc::FLOAT, grey.data());
+    std::transform(grey.begin(), grey.end(), image.pixels.begin(),
+                   [](float value) { return Rgb(value, value, value); });
+  }
+  check_complete(file, *input, complete);
+  if (encoding == ImageEncoding::color && !spec.format.is_floating_point()) {
+    for (Rgb& pixel : image.pixels) {
+      pixel = {linear_from_srgb(pixel.r), linear_from_srgb(pixel.g), linear_from_srgb(pixel.b)};
+    }
+  }
+  return image;
+}
+
+std::vector<float> alpha_of(const fs::path& file) {
+  const auto input = open_input(file);
+  const OIIO::ImageSpec spec = input->spec();
+  // Files that name no alpha may have one all the same, behind grey or colour.
+  int channel = spec.alpha_channel;
+  if (channel < 0 && (spec.nchannels == 2 || spec.nchannels == 4)) channel = spec.nchannels - 1;
+  if (channel < 0) return {};
+  std::vector<float> alpha(static_cast<std::size_t>(spec.width) *
+                           static_cast<std::size_t>(spec.height));
+  const bool complete =
+      input->read_image(0, 0, channel, channel + 1, OIIO::TypeDesc::FLOAT, alpha.data());
+  check_complete(file, *input, complete);
+  return alpha;
+}
+
 // The bytes of a picture's file. They are made in memory, and written by AtomicFile: writers of
 // pictures buffer, and a disk that is full when their last buffer goes out is no error to all of
 // them.
@@ -200,40 +250,11 @@ std::vector<unsigned char> encode_png(const fs::path& file, const Image& image) 
 }  // namespace
 
 Image load_image(const fs::path& file, ImageEncoding encoding) {
-  const auto input = open_input(file);
-  const OIIO::ImageSpec spec = input->spec();
-  Image image(spec.width, spec.height);
-  bool complete = true;
-  if (spec.nchannels >= 3) {
-    complete = input->read_image(0, 0, 0, 3, OIIO::TypeDesc::FLOAT, image.pixels.data());
-  } else {
-    std::vector<float> grey(image.pixels.size());
-    complete = input->read_image(0, 0, 0, 1, OIIO::TypeDesc::FLOAT, grey.data());
-    std::transform(grey.begin(), grey.end(), image.pixels.begin(),
-                   [](float value) { return Rgb(value, value, value); });
-  }
-  check_complete(file, *input, complete);
-  if (encoding == ImageEncoding::color && !spec.format.is_floating_point()) {
-    for (Rgb& pixel : image.pixels) {
-      pixel = {linear_from_srgb(pixel.r), linear_from_srgb(pixel.g), linear_from_srgb(pixel.b)};
-    }
-  }
-  return image;
+  return guarded(file, [&] { return load(file, encoding); });
 }
 
 std::vector<float> load_alpha(const fs::path& file) {
-  const auto input = open_input(file);
-  const OIIO::ImageSpec spec = input->spec();
-  // Files that name no alpha may have one all the same, behind grey or colour.
-  int channel = spec.alpha_channel;
-  if (channel < 0 && (spec.nchannels == 2 || spec.nchannels == 4)) channel = spec.nchannels - 1;
-  if (channel < 0) return {};
-  std::vector<float> alpha(static_cast<std::size_t>(spec.width) *
-                           static_cast<std::size_t>(spec.height));
-  const bool complete =
-      input->read_image(0, 0, channel, channel + 1, OIIO::TypeDesc::FLOAT, alpha.data());
-  check_complete(file, *input, complete);
-  return alpha;
+  return guarded(file, [&] { return alpha_of(file); });
 }
 
 void save_image(const fs::path& file, const Image& image) {

@@ -224,6 +224,21 @@ TEST(ImageIo, WhatIsNoPictureIsRefused) {
   EXPECT_EQ(load_error(folder / "large.hdr"), ErrorKind::format);
 }
 
+// A GIF whose canvas has no room: its reader throws what the standard library does.
+TEST(ImageIo, WhatReadersThrowIsARefusal) {
+  const TemporaryFolder folder;
+  const auto file = folder / "a.exr";
+  write_bytes(file, std::string("GIF8ressionf\0v\0\x1f", 16));
+  try {
+    load_image(file, ImageEncoding::color);
+    FAIL() << "read";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::format);
+    EXPECT_NE(std::string(error.what()).find("a.exr: is cut short or damaged"), std::string::npos)
+        << error.what();
+  }
+}
+
 TEST(ImageIo, SavingRefusesWhatItCannotDoAndLeavesNothing) {
   const TemporaryFolder folder;
   const Image image = noise(4, 4);
