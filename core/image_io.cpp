@@ -124,15 +124,22 @@ std::string reader_of(const fs::path& file) {
       {"MM\0\x2a"sv, "tiff"},
       {"RIFF"sv, "webp"},
       {"BM"sv, "bmp"},
-      {"GIF8"sv, "gif"},
   };
   for (const auto& [magic, reader] : kReaders) {
     if (bytes.substr(0, magic.size()) == magic) return reader;
   }
+  // Those that nothing begins with, or by one byte of many. Never any other: OpenImageIO has
+  // readers of films and of pictures that take all the room that a byte asks for.
+  constexpr std::pair<std::string_view, const char*> kSuffixes[] = {
+      {".exr", "openexr"}, {".hdr", "hdr"},  {".png", "png"},   {".jpg", "jpeg"},
+      {".jpeg", "jpeg"},   {".tif", "tiff"}, {".tiff", "tiff"}, {".tga", "targa"},
+      {".ppm", "pnm"},     {".pgm", "pnm"},  {".pfm", "pnm"}};
   std::string suffix = file.extension().string();
-  if (!suffix.empty()) suffix.erase(0, 1);
   for (char& c : suffix) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return suffix;
+  for (const auto& [name, reader] : kSuffixes) {
+    if (suffix == name) return reader;
+  }
+  return {};
 }
 
 std::unique_ptr<OIIO::ImageInput> open_input(const fs::path& file) {
@@ -145,7 +152,10 @@ std::unique_ptr<OIIO::ImageInput> open_input(const fs::path& file) {
   auto input = reader.empty() ? nullptr : OIIO::ImageInput::create(reader);
   if (!input) {
     OIIO::geterror();
-    fail(ErrorKind::format, file, "is no readable picture: no known format by content or suffix");
+    fail(ErrorKind::format, file,
+         "is no readable picture by content or suffix, expected EXR, HDR, PNG, JPEG, TIFF, WebP, "
+         "BMP, "
+         "TGA or PNM");
   }
   OIIO::ImageSpec spec;
   if (!input->open(file.string(), spec, hints)) {

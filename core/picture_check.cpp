@@ -1,4 +1,5 @@
-// Walks the chunks of a PNG and the attributes of an EXR header.
+// Walks the chunks of a PNG, the attributes of an EXR header, the segments of a JPEG; looks at the
+// size that a BMP or a WebP has.
 
 #include "core/picture_check.h"
 
@@ -6,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <cstring>
 #include <span>
 
@@ -17,6 +19,13 @@ namespace {
 
 constexpr unsigned char kPng[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
 constexpr unsigned char kExr[4] = {0x76, 0x2f, 0x31, 0x01};
+constexpr unsigned char kJpeg[3] = {0xff, 0xd8, 0xff};
+constexpr unsigned char kBmp[2] = {'B', 'M'};
+constexpr unsigned char kRiff[4] = {'R', 'I', 'F', 'F'};
+
+// Pixels that a byte of file can hold; no format of these packs more but for pictures of one
+// colour.
+constexpr std::uint64_t kMostPixels = 16384;
 
 class Walk {
  public:
@@ -37,6 +46,45 @@ class Walk {
       if (std::memcmp(buffer_.data() + 4, "IEND", 4) == 0) return;
       at += 12 + length;
     }
+  }
+
+  // Marker, length (big-endian, itself included), bytes, the next one; a frame's begins with bits a
+  // sample, height and width.
+  void jpeg() {
+    for (std::uint64_t at = 2; look(at, 9) == 9;) {
+      const unsigned marker = byte(1);
+      if (byte(0) != 0xff) return;
+      if (marker == 0xff) {  // fills up
+        ++at;
+        continue;
+      }
+      constexpr unsigned kFirstFrame = 0xc0, kLastFrame = 0xcf, kTables = 0xc4, kReserved = 0xc8,
+                         kArithmetic = 0xcc, kScan = 0xda;
+      if (marker == kScan) return;
+      if (marker >= kFirstFrame && marker <= kLastFrame && marker != kTables &&
+          marker != kReserved && marker != kArithmetic) {
+        return promise(byte(7) << 8 | byte(8), byte(5) << 8 | byte(6));
+      }
+      at += 2 + std::uint64_t{byte(2) << 8 | byte(3)};
+    }
+  }
+
+  // Width and height follow a header of 18 bytes; the latter is negative from the top down.
+  void bmp() {
+    if (look(18, 8) < 8) return;
+    const auto size = [&](std::size_t at) {
+      const std::uint32_t bits = little(at, 4);
+      return bits & 0x80000000u ? ~bits + 1 : bits;
+    };
+    promise(size(0), size(4));
+  }
+
+  void webp() {
+    if (look(8, 22) < 22 || std::memcmp(buffer_.data(), "WEBPVP8", 7) != 0) return;
+    const char kind = static_cast<char>(byte(7));
+    if (kind == ' ') promise(little(18, 2) & 0x3fff, little(20, 2) & 0x3fff);
+    if (kind == 'L') promise((little(13, 4) & 0x3fff) + 1, (little(13, 4) >> 14 & 0x3fff) + 1);
+    if (kind == 'X') promise(little(16, 3) + 1, little(19, 3) + 1);
   }
 
   // Name and type, each with a zero behind it, length (little-endian), bytes, the next one; an
@@ -67,6 +115,20 @@ class Walk {
 
  private:
   unsigned byte(std::size_t i) const { return std::to_integer<unsigned>(buffer_[i]); }
+
+  std::uint32_t little(std::size_t at, std::size_t bytes) const {
+    std::uint32_t value = 0;
+    for (std::size_t i = bytes; i-- > 0;) value = value << 8 | byte(at + i);
+    return value;
+  }
+
+  void promise(std::uint64_t width, std::uint64_t height) const {
+    if (width * height <= kMostPixels * input_.size()) return;
+    throw Error(ErrorKind::format,
+                fmt::format("{}: has {}x{} pixels in {} bytes, expected more of them: is it cut "
+                            "short?",
+                            file_.string(), width, height, input_.size()));
+  }
 
   // Fills the buffer from `at` on; how much there was.
   std::size_t look(std::uint64_t at, std::size_t most) {
@@ -99,6 +161,9 @@ void check_picture_parts(const std::filesystem::path& file) {
   Walk walk(file);
   if (walk.begins_with(kPng)) walk.png();
   if (walk.begins_with(kExr)) walk.exr();
+  if (walk.begins_with(kJpeg)) walk.jpeg();
+  if (walk.begins_with(kBmp)) walk.bmp();
+  if (walk.begins_with(kRiff)) walk.webp();
 }
 
 }  // namespace haarlight
