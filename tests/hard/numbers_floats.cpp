@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -53,6 +54,14 @@ class TurningSky {
     }
     return processor_seconds() - begin;
   }
+  // Of the last frame's pixels' numbers, how many have the exponent of denormals.
+  std::int64_t denormals() const {
+    std::int64_t count = 0;
+    for (const Rgb& pixel : relighter_.picture().pixels) {
+      for (const float x : {pixel.r, pixel.g, pixel.b}) count += std::fpclassify(x) == FP_SUBNORMAL;
+    }
+    return count;
+  }
 
  private:
   ImageRelighter relighter_;
@@ -80,16 +89,21 @@ TEST(HardCases, Row09_Denormals) {
         Case{"denormals beside light", 1, 3e-39f, transport},
         Case{"1e-28 sky on black velvet", 1e-31, 0.0f, black}}) {
     TurningSky sky(c.transport, c.scale, c.dark);
-    double ratio = HUGE_VAL;
-    for (int round = 0; round < 12 && ratio > 1.1; ++round) {
-      double plain = HUGE_VAL, traces = HUGE_VAL;
-      for (int run = 0; run < 7; ++run) {
+    // The least of many, in turns: what disturbs a run makes it longer, never shorter.
+    double plain = HUGE_VAL, traces = HUGE_VAL;
+    std::int64_t denormals = 0;
+    for (int round = 0; round < 12 && (round < 3 || traces > 1.1 * plain); ++round) {
+      for (int run = 0; run < 5; ++run) {
         plain = std::min(plain, normal.seconds(4));
         traces = std::min(traces, sky.seconds(4));
+        denormals += sky.denormals();
       }
-      ratio = std::min(ratio, traces / plain);
     }
+    const double ratio = traces / plain;
     at_most(std::string(c.name) + ": time of a normal one", ratio, 1.2);
+#if defined(__SSE__)
+    at_most(std::string(c.name) + ": denormals in pixels", static_cast<double>(denormals), 0);
+#endif
   }
 }
 
