@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -36,6 +37,7 @@ struct AnimateCommand {
   int frames = 0;  // 0: all of the animation
   int first = 0;
   double rate = 25;
+  int seed = 1;
   PathPictureOptions picture{512, 512, 64, 1, false, false};
   CachingOptions caching;
   InstantOptions instant;
@@ -49,11 +51,16 @@ struct AnimateCommand {
 };
 
 std::unique_ptr<AnimationMethod> AnimateCommand::make(const AnimatedScene& animation) const {
-  if (method == "path") return std::make_unique<PathMethod>(animation, picture);
+  const auto number = static_cast<std::uint64_t>(seed);
+  if (method == "path") {
+    PathPictureOptions options = picture;
+    options.seed = number;
+    return std::make_unique<PathMethod>(animation, options);
+  }
   if (method == "irc" || method == "trc") {
     CachingOptions options = caching;
     options.width = picture.width, options.height = picture.height;
-    options.temporal = method == "trc";
+    options.temporal = method == "trc", options.seed = number;
     return std::make_unique<CachingMethod>(animation, options);
   }
   InstantOptions options = instant;
@@ -148,6 +155,8 @@ Verb add_animate(CLI::App& verb) {
       "those of other methods do");
   add_choice<bool>(verb, "--noise", c.picture.frozen, {{"fresh", false}, {"frozen", true}},
                    "path: frozen: the same random numbers in every frame");
+  add_integer(verb, "--seed", c.seed, 1, kMaxSamples,
+              "path, irc, trc: of random numbers; another seed, other noise");
   add_caching_options(verb, c.caching);
   add_instant_options(verb, c.instant);
   verb.add_option_function<std::string>(

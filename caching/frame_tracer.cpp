@@ -61,7 +61,8 @@ RgbD reflected(const Bsdf& bsdf, const Vec3& w) {
   return f;
 }
 
-FrameTracer::FrameTracer(const AnimatedFrame& frame) : frame_(frame), visibility_(frame.scene) {
+FrameTracer::FrameTracer(const AnimatedFrame& frame)
+    : frame_(frame), visibility_(frame.scene), bright_(frame, visibility_) {
   for (std::uint32_t t = 0; t < frame.scene.triangle.size(); ++t) {
     const Emission& emission = frame.emission[frame.scene.triangle[t].material];
     const double power = luminance(emission.radiance) * (emission.both_sides ? 2 : 1);
@@ -104,11 +105,8 @@ double FrameTracer::chance_to_hit(std::uint32_t triangle, const Vec3&, const Vec
   return chances_.of(i) / shining_[i].area * distance * distance / cosine;
 }
 
-RgbD FrameTracer::direct(const SurfaceHit& surface, const Bsdf& bsdf, PathRandom& random, bool mis,
-                         LampShare* lamps) const {
-  RgbD sum;
-  if (lamps) *lamps = {};
-  if (bsdf.is_specular()) return sum;
+FrameTracer::LampShare FrameTracer::lamp_light(const SurfaceHit& surface, const Bsdf& bsdf) const {
+  LampShare out;
   const Vec3 place = surface.position;
   for (std::size_t n = 0; n < frame_.light.size(); ++n) {
     const SceneLight& light = frame_.light[n];
@@ -125,12 +123,22 @@ RgbD FrameTracer::direct(const SurfaceHit& surface, const Bsdf& bsdf, PathRandom
     if (!(l1_norm(f) > 0)) continue;
     const Vec3 origin = off_surface(place, surface.geometric_normal, arrival.from);
     if (visibility_.occluded(floats(origin), arrival.from, arrival.distance)) {
-      if (lamps && n < 64) lamps->hidden |= std::uint64_t{1} << n;
+      if (n < 64) out.hidden |= std::uint64_t{1} << n;
       continue;
     }
-    sum += f * arrival.irradiance;
+    out.radiance += f * arrival.irradiance;
   }
-  if (lamps) lamps->radiance = sum;
+  return out;
+}
+
+RgbD FrameTracer::direct(const SurfaceHit& surface, const Bsdf& bsdf, PathRandom& random, bool mis,
+                         LampShare* lamps) const {
+  if (lamps) *lamps = {};
+  if (bsdf.is_specular()) return {};
+  const LampShare found = lamp_light(surface, bsdf);
+  if (lamps) *lamps = found;
+  RgbD sum = found.radiance;
+  const Vec3 place = surface.position;
   if (shining_.empty()) return sum;
 
   // One place on the shining triangles.
@@ -171,6 +179,43 @@ RgbD FrameTracer::environment_light(const SurfaceHit& surface, const Bsdf& bsdf,
   if (visibility_.occluded(floats(from), w, kInfinity)) return {};
   const double weight = mis ? power_heuristic(sample.pdf, PartChances(bsdf).pdf(bsdf, w)) : 1;
   return f * frame_.environment->radiance(sample.from) * (weight / sample.pdf);
+}
+
+double FrameTracer::chance_of_bright(std::uint32_t triangle, const Vec3& direction,
+                                     double distance) const {
+  const double chance = bright_.chance(triangle);
+  if (!(chance > 0)) return 0;
+  const auto [a, b, c] = visibility_.corners(triangle);
+  const double cosine = std::abs(dot(normalize(cross(b - a, c - a)), direction));
+  return cosine > 0 ? chance * distance * distance / cosine : 0;
+}
+
+FrameTracer::BrightLook FrameTracer::look_at_bright(const Vec3& position,
+                                                    const Vec3& geometric_normal,
+                                                    PathRandom& random) const {
+  BrightLook look;
+  const double u = random.next(), v = random.next(), w = random.next();
+  const BrightSurfaces::Sample sample = bright_.choose(u, v, w);
+  const Vec3 way = sample.position - position;
+  look.distance = length(way);
+  if (!(look.distance > 4 * Visibility::kSurfaceOffset)) return look;
+  look.direction = way * (1 / look.distance);
+  if (!(dot(look.direction, geometric_normal) > 0)) return look;
+  const double pdf = chance_of_bright(sample.hit.triangle, look.direction, look.distance);
+  if (!(pdf > 0)) return look;
+  Visibility::Hit hit = sample.hit;
+  hit.distance = look.distance;
+  const SurfaceHit there = surface_at(frame_.scene, visibility_, hit, look.direction);
+  const Bsdf bsdf = bsdf_at(frame_.scene, there);
+  if (bsdf.is_specular()) return look;
+  const Vec3 from = off_surface(position, geometric_normal, look.direction);
+  const Vec3 between = off_surface(sample.position, there.geometric_normal, -look.direction) - from;
+  const double span = length(between);
+  if (visibility_.occluded(floats(from), between * (1 / span), span)) return look;
+  look.by_lamps = lamp_light(there, bsdf);
+  look.place = {hit.triangle, hit.b1, hit.b2, there.outside};
+  look.pdf = pdf;
+  return look;
 }
 
 RgbD FrameTracer::lobe_light(const SurfaceHit& surface, const Bsdf& bsdf, PathRandom& random,
@@ -222,7 +267,24 @@ RgbD FrameTracer::radiance(const std::optional<Visibility::Hit>& first, const Ve
       sum += passed * emission * (pdf > 0 ? power_heuristic(pdf, other) : 1);
     }
     const Bsdf bsdf = bsdf_at(frame_.scene, surface);
-    sum += passed * direct(surface, bsdf, random, true, bounce == 0 ? lamps : nullptr);
+    LampShare by_lamps;
+    RgbD seen = direct(surface, bsdf, random, true, &by_lamps);
+    if (bounce == 0 && lamps) *lamps = by_lamps;
+    if (!bright_.empty()) {
+      // What lamps make bright is found by its own samples, too.
+      const double other =
+          pdf > 0 ? chance_of_bright(hit->triangle, direction, surface.distance) : 0;
+      if (other > 0) seen += by_lamps.radiance * (power_heuristic(pdf, other) - 1);
+      const BrightLook look =
+          bsdf.is_specular() ? BrightLook{}
+                             : look_at_bright(surface.position, surface.geometric_normal, random);
+      if (look.pdf > 0) {
+        const double weight =
+            power_heuristic(look.pdf, PartChances(bsdf).pdf(bsdf, look.direction));
+        seen += reflected(bsdf, look.direction) * look.by_lamps.radiance * (weight / look.pdf);
+      }
+    }
+    sum += passed * seen;
     if (frame_.environment) sum += passed * environment_light(surface, bsdf, random, true);
 
     // One way on.

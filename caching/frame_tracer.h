@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "caching/animated_scene.h"
+#include "caching/body_place.h"
+#include "caching/bright_surfaces.h"
 #include "precompute/bsdf.h"
 #include "precompute/chances.h"
 #include "precompute/random.h"
@@ -48,6 +50,22 @@ class FrameTracer {
   RgbD environment_light(const SurfaceHit& surface, const Bsdf& bsdf, PathRandom& random,
                          bool mis) const;
 
+  /// The surfaces that lamps light most: paths look for them as they do for shining triangles.
+  const BrightSurfaces& bright() const { return bright_; }
+
+  /// One look from a place at them, by three random numbers.
+  struct BrightLook {
+    Vec3 direction;       ///< unit
+    double distance = 0;  ///< local units
+    double pdf = 0;       ///< per solid angle; 0: nothing is seen
+    LampShare by_lamps;   ///< what comes from there
+    BodyPlace place;      ///< what is seen
+  };
+  BrightLook look_at_bright(const Vec3& position, const Vec3& geometric_normal,
+                            PathRandom& random) const;
+  /// The density per solid angle with which look_at_bright() chooses what a ray has hit.
+  double chance_of_bright(std::uint32_t triangle, const Vec3& direction, double distance) const;
+
   /// An unbiased estimate of what a surface sends to its viewer by way of its lobe, of light that
   /// has been reflected before, and of the background.
   RgbD lobe_light(const SurfaceHit& surface, const Bsdf& bsdf, PathRandom& random,
@@ -77,10 +95,12 @@ class FrameTracer {
   };
   double chance_to_hit(std::uint32_t triangle, const Vec3& from, const Vec3& direction,
                        double distance) const;
+  LampShare lamp_light(const SurfaceHit& surface, const Bsdf& bsdf) const;
   bool shines(std::uint32_t triangle, const Vec3& direction) const;
 
   const AnimatedFrame& frame_;
   Visibility visibility_;
+  BrightSurfaces bright_;
   std::vector<Shining> shining_;
   Chances chances_;                   // of shining_, by power
   std::vector<std::int32_t> number_;  // in shining_ by triangle, or -1; empty: none shines

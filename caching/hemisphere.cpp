@@ -13,6 +13,17 @@ namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
+constexpr int kLooks = 256;
+
+// The weight of strata against looks of that density: of all samples in a direction, strata's. As
+// one stratum's radiance is worth one sample of the strata, a look's is worth as much times this
+// weight.
+double share_of_strata(const Hemisphere& h, double cosine, double looked) {
+  const double strata = static_cast<double>(h.direction.size()) *
+                        (h.even ? 1 / (2 * kPi) : std::max(cosine, 0.0) / kPi);
+  return strata / (strata + kLooks * looked);
+}
+
 Vec3 in_plane(double phi) { return {std::cos(phi), std::sin(phi), 0}; }
 
 }  // namespace
@@ -73,10 +84,29 @@ void gather_hemisphere(const FrameTracer& tracer, const PlaceFrame& at, std::uin
         h.distance[i] = visibility.to_world_length(hit->distance);
         const auto [a, b, c] = visibility.corners(hit->triangle);
         what.place = {hit->triangle, hit->b1, hit->b2, dot(cross(b - a, c - a), direction) <= 0};
+        const double looked = tracer.chance_of_bright(hit->triangle, direction, hit->distance);
+        if (looked > 0) {
+          const RgbD all = what.by_lamps.radiance;
+          what.by_lamps.radiance *= share_of_strata(h, h.direction[i].z, looked);
+          h.radiance[i] += what.by_lamps.radiance - all;
+        }
       }
       what.rest = h.radiance[i] - what.by_lamps.radiance;
     }
     if (seen) (*seen)[i] = what;
+  }
+  if (tracer.bright().empty()) return;
+  for (int n = 0; n < kLooks; ++n) {
+    PathRandom random(mix_bits(key ^ 0xb1196, static_cast<std::uint64_t>(n)));
+    const auto look = tracer.look_at_bright(place, at.geometric_normal, random);
+    if (!(look.pdf > 0)) continue;
+    const Vec3 d = at.to_local(look.direction);
+    if (!(d.z > 0)) continue;
+    SeenPlace what;
+    what.place = look.place, what.by_lamps = look.by_lamps, what.stratum = h.stratum_of(d);
+    what.by_lamps.radiance *= share_of_strata(h, d.z, look.pdf);
+    h.radiance[what.stratum] += what.by_lamps.radiance;
+    if (seen) seen->push_back(what);
   }
 }
 

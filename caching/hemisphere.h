@@ -45,12 +45,16 @@ struct SeenPlace {
   BodyPlace place;                  ///< its triangle is kBackground or, below the horizon, kBelow
   FrameTracer::LampShare by_lamps;  ///< of the radiance
   RgbD rest;                        ///< of the radiance
+  /// Of a look: the stratum that it adds its radiance to.
+  std::size_t stratum = 0;
 };
 
 /// Fills in the light that arrives at `at`, a place in the tracer's frame: what surfaces send after
 /// at least one reflection, all further bounces by paths, and the background. What surfaces shine
 /// by themselves is left out: that is direct light. Directions below the triangle see nothing, at
-/// no distance that counts. `seen`, if wanted, gets one entry a stratum.
+/// no distance that counts. Surfaces that lamps make bright are also looked at by themselves, 64
+/// times, weighted against the strata by the balance heuristic (Veach 1997, section 9.2). `seen`,
+/// if wanted, gets one entry a stratum, then one a look that found something.
 void gather_hemisphere(const FrameTracer& tracer, const PlaceFrame& at, std::uint64_t key,
                        Hemisphere& hemisphere, std::vector<SeenPlace>* seen);
 

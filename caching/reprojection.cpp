@@ -168,7 +168,12 @@ Hemisphere reprojected(const Hemisphere& now, const std::vector<SeenPlace>& seen
   const bool itself = change.moves(place.triangle);
   const PlaceFrame at = place_in(change.next().scene, place);
   const PlaceFrame before = place_in(change.now().scene, place);
-  const std::size_t size = seen.size();
+  const std::size_t size = now.direction.size();
+  // Looks at bright surfaces move by themselves.
+  for (std::size_t i = size; i < seen.size(); ++i) {
+    next.radiance[seen[i].stratum] += seen[i].by_lamps.radiance * -1;
+  }
+  const std::vector<RgbD> by_strata = next.radiance;
   std::vector<Part> moved;
   std::vector<bool> stays(size, true);
   for (std::size_t i = 0; i < size; ++i) {
@@ -211,9 +216,34 @@ Hemisphere reprojected(const Hemisphere& now, const std::vector<SeenPlace>& seen
         continue;
       }
     }
-    if (!(radiance == now.radiance[i])) ++counts.moved;
+    if (!(radiance == by_strata[i])) ++counts.moved;
   }
+  const auto add_looks = [&] {
+    for (std::size_t i = size; i < seen.size(); ++i) {
+      const SeenPlace& look = seen[i];
+      const std::uint32_t triangle = look.place.triangle;
+      const bool moves = change.moves(triangle);
+      RgbD radiance = look.by_lamps.radiance;
+      std::size_t stratum = look.stratum;
+      if (itself || moves || change.lights_change() || change.recolors(triangle)) {
+        const PlaceFrame here = place_in(change.now().scene, look.place);
+        const PlaceFrame there = place_in(change.next().scene, look.place);
+        radiance = next_radiance(look, here, there, change);
+        if (itself || moves) {
+          const Vec3 from = here.position - before.position, way = there.position - at.position;
+          if (!(length(from) > 0) || !(length(way) > 0)) continue;
+          const Vec3 old = before.to_local(normalize(from)), d = at.to_local(normalize(way));
+          if (!(d.z > 0) || dot(there.geometric_normal, way) > 0) continue;
+          radiance *= growth(now.even, here, from, old.z, there, way, d.z);
+          stratum = now.stratum_of(d);
+        }
+        ++counts.moved;
+      }
+      next.radiance[stratum] += radiance;
+    }
+  };
   if (std::find(stays.begin(), stays.end(), false) == stays.end()) {
+    add_looks();
     if (report) *report = counts;
     return next;
   }
@@ -256,12 +286,13 @@ Hemisphere reprojected(const Hemisphere& now, const std::vector<SeenPlace>& seen
           if (from < size && strata.deepest[from] > now.distance[i]) break;
         }
         // Nothing around it either: it stays as it was.
-        next.radiance[i] += (from < size ? strata.behind[from] : now.radiance[i]) * hole;
+        next.radiance[i] += (from < size ? strata.behind[from] : by_strata[i]) * hole;
         nearness[i] += hole / (from < size ? strata.deepest[from] : now.distance[i]);
       }
       next.distance[i] = 1 / nearness[i];
     }
   }
+  add_looks();
   if (report) *report = counts;
   return next;
 }

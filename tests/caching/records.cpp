@@ -14,6 +14,7 @@
 #include "caching/reprojection.h"
 #include "caching/temporal_weight.h"
 #include "core/hash_bits.h"
+#include "tests/caching/estimate.h"
 #include "tests/precompute/shapes.h"
 
 namespace haarlight {
@@ -405,6 +406,112 @@ TEST(Reprojection, PlaceOnABodyThatTurnsWithAllElseSeesTheSame) {
   // A direction on a border may fall into the next stratum by rounding: none of 400 does here.
   EXPECT_NEAR(b.irradiance.g, a.irradiance.g, 1e-6 * a.irradiance.g);
   EXPECT_NEAR(b.translation_x.g, a.translation_x.g, 1e-4 * a.irradiance.g);
+}
+
+// A small board with a lamp close under it, over a wide floor of little albedo that sees neither
+// the lamp's light on itself nor anything else: all light after a reflection is the board's.
+AnimatedFrame lit_board() {
+  Scene scene = shapes::empty_scene();
+  shapes::add_quad(scene, {-20, 0, 20}, {40, 0, 0}, {0, 0, -40});
+  scene.material[0].albedo = {0, 0, 0};
+  scene.material.push_back(scene.material[0]);
+  scene.material[1].albedo = {0.5f, 0.5f, 0.5f};
+  shapes::add_quad(scene, {0.9, 2, 0}, {0.1, 0, 0}, {0, 0, 0.1}, 1);  // faces down
+  AnimatedFrame frame;
+  frame.emission.resize(2);
+  frame.scene = std::move(scene);
+  SceneLight light;
+  light.position = {0.95, 1.9, 0.05}, light.intensity = {1, 1, 1};
+  frame.light.push_back(light);
+  return frame;
+}
+
+// The irradiance of a place on the floor, or its integral over solid angle, by midpoints.
+double from_board(const Vec3& at, bool irradiance = true) {
+  constexpr int kSteps = 40;
+  double sum = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    for (int j = 0; j < kSteps; ++j) {
+      const Vec3 p{0.9 + 0.1 * (i + 0.5) / kSteps, 2, 0.1 * (j + 0.5) / kSteps};
+      const Vec3 lamp = Vec3{0.95, 1.9, 0.05} - p, way = at - p;
+      const double arrives = 0.1 / std::pow(dot(lamp, lamp), 1.5);
+      const double square = dot(way, way);
+      const double cosine = 2 / std::sqrt(square);
+      sum += 0.5 / kPi * arrives * (irradiance ? cosine : 1) * cosine / square * 0.01 /
+             (kSteps * kSteps);
+    }
+  }
+  return sum;
+}
+
+TEST(BrightSurfaces, AreFoundByRecordsThatWouldMissThem) {
+  const AnimatedFrame frame = lit_board();
+  const FrameTracer tracer(frame);
+  ASSERT_FALSE(tracer.bright().empty());
+  EXPECT_EQ(tracer.bright().chance(0), 0);
+  const BodyPlace place{0, 0, 0.5, true};
+  const PlaceFrame at = place_in(frame.scene, place);
+  for (const bool even : {false, true}) {
+    constexpr int kRecords = 200;
+    const double wanted = from_board(at.position, !even);
+    const Estimate found = estimate(7, kRecords, [&](PathRandom& random) {
+      const auto key = static_cast<std::uint64_t>(random.next() * 1e15);
+      Hemisphere h = stratified_hemisphere(400, key, even);
+      std::vector<SeenPlace> seen;
+      gather_hemisphere(tracer, at, key, h, &seen);
+      double sum = 0;
+      for (const RgbD& light : h.radiance) sum += light.g;
+      return sum * (even ? 2 : 1) * kPi / static_cast<double>(h.direction.size());
+    });
+    EXPECT_NEAR(found.mean, wanted, 4 * found.error) << even;
+    // The board is 6e-4 of the hemisphere: 400 strata alone would spread by 200 %. 256 looks at
+    // light that varies by a factor of 5 spread by 4 %.
+    EXPECT_LT(found.error * std::sqrt(kRecords), 0.15 * wanted) << even;
+  }
+}
+
+TEST(BrightSurfaces, PathsWeighBothWaysToThem) {
+  // A floor of albedo 1 at another place: what it sends up is its irradiance over pi. Paths that
+  // come from it by chance and looks at the board must add up to one.
+  AnimatedFrame frame = lit_board();
+  frame.scene.material[0].albedo = {0.999f, 0.999f, 0.999f};
+  frame.light[0].kind = SceneLight::Kind::spot;  // up, so that the floor has no light of the lamp
+  frame.light[0].direction = {0, 1, 0};
+  frame.light[0].inner = 1.3, frame.light[0].outer = 1.4;
+  const FrameTracer tracer(frame);
+  ASSERT_FALSE(tracer.bright().empty());
+  const Vec3 there{0.7, 0, 0.3};
+  const Vec3 from = tracer.visibility().to_local({0.6, 0.5, 0.3});
+  const Vec3 way = normalize(tracer.visibility().to_local(there) - from);
+  const Estimate found =
+      estimate(3, 4000, [&](PathRandom& random) { return tracer.radiance(from, way, random).g; });
+  // Nearly all of the light: what goes up from the floor and comes back off the board is 1e-4 of
+  // it.
+  const double wanted = 0.999 * from_board(there) / kPi;
+  EXPECT_NEAR(found.mean, wanted, 4 * found.error + 1e-3 * wanted);
+  EXPECT_LT(found.error, 0.02 * wanted);  // by chance alone 4000 paths would leave 60 %
+}
+
+TEST(Reprojection, LooksAtBrightSurfacesMoveWithThem) {
+  const AnimatedFrame now = lit_board();
+  AnimatedFrame next = now;
+  // Board and lamp go to the side together.
+  for (std::size_t v = 4; v < 8; ++v) next.scene.position[v].x += 0.3;
+  next.light[0].position.x += 0.3;
+  const FrameTracer tracer(now);
+  const BodyPlace place{0, 0, 0.5, true};
+  const PlaceFrame at = place_in(now.scene, place);
+  const FrameChange change(now, next);
+  const Estimate found = estimate(5, 50, [&](PathRandom& random) {
+    const auto key = static_cast<std::uint64_t>(random.next() * 1e15);
+    Hemisphere h = stratified_hemisphere(400, key);
+    std::vector<SeenPlace> seen;
+    gather_hemisphere(tracer, at, key, h, &seen);
+    return record_value(reprojected(h, seen, place, change)).irradiance.g;
+  });
+  const double wanted = from_board(at.position - Vec3{0.3, 0, 0});
+  EXPECT_GT(from_board(at.position) - wanted, 0.15 * wanted);
+  EXPECT_NEAR(found.mean, wanted, 4 * found.error);
 }
 
 }  // namespace
