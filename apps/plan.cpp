@@ -41,10 +41,11 @@ std::string error_text(double error) {
 
 // What of a glTF file moves; nothing of files that hold no animation that can be read, which is for
 // animate to complain about.
-std::optional<MotionPlan> motion_of(const std::filesystem::path& file) {
+std::optional<MotionPlan> motion_of(const std::filesystem::path& file, bool interactive) {
   if (file.extension() != ".gltf" && file.extension() != ".glb") return std::nullopt;
   try {
-    return plan_motion(AnimatedScene(file));
+    const AnimatedScene scene(file);
+    return interactive ? plan_interaction(scene) : plan_motion(scene);
   } catch (const Error&) {
     return std::nullopt;
   }
@@ -53,7 +54,7 @@ std::optional<MotionPlan> motion_of(const std::filesystem::path& file) {
 struct PlanCommand {
   SceneOptions scene;
   MeshOptions options;
-  bool json = false;
+  bool json = false, interactive = false;
 
   void run();
 };
@@ -67,14 +68,15 @@ void PlanCommand::run() {
   const Plan plan = scene.vertices ? plan_mesh(staged.scene, planning)
                                    : plan_image(staged.scene, staged.stage.camera, planning);
   print_notes(scene.scene, plan.notes);
-  const std::optional<MotionPlan> motion = motion_of(scene.scene);
+  const std::optional<MotionPlan> motion = motion_of(scene.scene, interactive);
   if (json) {
     nlohmann::json out = nlohmann::json::parse(to_json(plan, true));
     if (motion) {
       out["method"] = {
           {"name", to_string(motion->method)},  {"why", motion->why},
           {"moving_triangles", motion->moving}, {"moving_lights", motion->moving_lights},
-          {"near_lights", motion->near_lights}, {"frames", motion->frames}};
+          {"near_lights", motion->near_lights}, {"frames", motion->frames},
+          {"touched_rays", motion->touched}};
     }
     fmt::print("{}\n", out.dump());
     return;
@@ -103,6 +105,9 @@ Verb add_plan(CLI::App& verb) {
   PlanCommand& c = *command;
   add_scene_options(verb, c.scene, c.options);
   verb.add_flag("--json", c.json, "the same for programs");
+  verb.add_flag(
+      "--interactive", c.interactive,
+      "glTF: a person will move things, and no frame is known beforehand: which method then");
   add_threads(verb)->group("Running");
   verb.footer(
       "\nThe error without an effect is relative RMS over the picture and the built-in lightings;\n"

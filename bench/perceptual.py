@@ -7,8 +7,9 @@ degree (0.7 m from a screen 0.7 m and 3840 pixels wide), as in the paper.
 import numpy as np
 
 PIXELS_A_DEGREE = 67
-TO_XYZ = np.array([[0.4123907993, 0.3575843394, 0.1804807884], [0.2126390059, 0.7151686788, 0.0721923154],
-                   [0.0193308187, 0.1191947798, 0.9505321522]])
+TO_XYZ = np.array([[10135552 / 24577794, 8788810 / 24577794, 4435075 / 24577794],
+                   [2613072 / 12288897, 8788810 / 12288897, 887015 / 12288897],
+                   [1425312 / 73733382, 8788810 / 73733382, 70074185 / 73733382]])  # sRGB, D65
 WHITE = TO_XYZ.sum(axis=1)
 
 
@@ -51,13 +52,12 @@ def seen(opponents):
     """What the eye's contrast sensitivity leaves of each channel."""
     out = np.empty_like(opponents)
     for c, parts in enumerate([[(1, 0.0047)], [(1, 0.0053)], [(34.1, 0.04), (13.5, 0.025)]]):
-        widest = max(b for _, b in parts)
-        r = int(np.ceil(3 * np.sqrt(widest / (2 * np.pi**2)) * PIXELS_A_DEGREE))
+        r = int(np.ceil(3 * np.sqrt(0.04 / (2 * np.pi**2)) * PIXELS_A_DEGREE))  # of the widest of all
         x = np.arange(-r, r + 1) / PIXELS_A_DEGREE
         total, size = 0, 0
         for a, b in parts:
             g = np.exp(-np.pi**2 * x * x / b)
-            weight = a * np.pi / b if len(parts) > 1 else 1
+            weight = a * np.sqrt(np.pi / b)
             total = total + weight * across(across(opponents[..., c], g, 0), g, 1)
             size += weight * g.sum()**2
         out[..., c] = total / size

@@ -5,14 +5,55 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
+#include <map>
 #include <vector>
 
 #include "caching/reprojection.h"
 
 namespace haarlight {
 
+namespace {
+
+struct Box {
+  Vec3 low{kFar, kFar, kFar}, high{-kFar, -kFar, -kFar};
+  static constexpr double kFar = std::numeric_limits<double>::infinity();
+
+  void add(const Vec3& p) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+  double surface() const {
+    const Vec3 d = high - low;
+    return d.x >= 0 ? 2 * (d.x * d.y + d.y * d.z + d.z * d.x) : 0;
+  }
+  // Whether it is as wide as `all`, or nearly, along two axes: a wall, a floor, a room.
+  bool spans(const Box& all) const {
+    constexpr double kNearly = 0.8;
+    const Vec3 d = high - low, whole = (all.high - all.low) * kNearly;
+    return (d.x >= whole.x) + (d.y >= whole.y) + (d.z >= whole.z) >= 2;
+  }
+};
+
+struct Body {
+  Box box;
+  double area = 0;
+};
+
+}  // namespace
+
 const char* to_string(MotionPlan::Method method) {
-  return method == MotionPlan::Method::prt ? "prt" : "trc";
+  switch (method) {
+    case MotionPlan::Method::prt:
+      return "prt";
+    case MotionPlan::Method::trc:
+      return "trc";
+    case MotionPlan::Method::tic:
+      return "tic";
+    case MotionPlan::Method::ic:
+      break;
+  }
+  return "ic";
 }
 
 MotionPlan plan_motion(const AnimatedScene& scene) {
@@ -61,6 +102,39 @@ MotionPlan plan_motion(const AnimatedScene& scene) {
   } else {
     plan.why = "0 % of the triangles move, and no light is in the scene: it is distant";
   }
+  return plan;
+}
+
+MotionPlan plan_interaction(const AnimatedScene& scene) {
+  constexpr double kMost = 0.5;
+  MotionPlan plan;
+  plan.frames = scene.frames();
+  const AnimatedFrame frame = scene.at(0);
+  Box all;
+  double area = 0;
+  std::map<std::uint32_t, Body> body;
+  for (std::uint32_t t = 0; t < frame.scene.triangle.size(); ++t) {
+    Body& b = body[scene.instance_of(t)];
+    const auto [va, vb, vc] = frame.scene.triangle[t].vertex;
+    const Vec3 &p = frame.scene.position[va], &q = frame.scene.position[vb],
+               &r = frame.scene.position[vc];
+    for (const Vec3* corner : {&p, &q, &r}) b.box.add(*corner), all.add(*corner);
+    const double size = 0.5 * length(cross(q - p, r - p));
+    b.area += size, area += size;
+  }
+  int bodies = 0;
+  for (const auto& [node, b] : body) {
+    const double passed = all.surface() > 0 ? b.box.surface() / all.surface() : 0;
+    if (b.box.spans(all)) continue;
+    ++bodies;
+    const double on_it = area > 0 ? b.area / area : 0;
+    plan.touched = std::max(plan.touched, 1 - (1 - passed) * (1 - on_it));
+  }
+  plan.near_lights = static_cast<int>(frame.light.size());
+  plan.method = plan.touched < kMost ? MotionPlan::Method::tic : MotionPlan::Method::ic;
+  plan.why = fmt::format(
+      "a person moves one of {} bodies at a time: at most {:.3g} % of all rays are traced again",
+      bodies, 100 * plan.touched);
   return plan;
 }
 

@@ -58,17 +58,20 @@ double ratio_of(const RadianceValue& now, const RadianceValue& next, const LobeV
   return temporal_ratio(now, next, view, *lobes);
 }
 
-// |a - b| as a share of b, summed over channels or coefficients.
+// |a - b| as a share of the larger of the two, summed over channels or coefficients: a place that
+// is all but dark counts as much as any other, and not for more.
 double difference(const RecordValue& a, const RecordValue& b) {
-  const double size = l1_norm(b.irradiance);
+  const double size = std::max(l1_norm(a.irradiance), l1_norm(b.irradiance));
   return size > 0 ? l1_norm(a.irradiance - b.irradiance) / size : 0;
 }
 double difference(const RadianceValue& a, const RadianceValue& b) {
-  double size = 0, off = 0;
+  double size_a = 0, size_b = 0, off = 0;
   for (std::size_t i = 0; i < b.coefficient.size(); ++i) {
-    size += std::abs(static_cast<double>(b.coefficient[i]));
+    size_a += std::abs(static_cast<double>(a.coefficient[i]));
+    size_b += std::abs(static_cast<double>(b.coefficient[i]));
     off += std::abs(static_cast<double>(a.coefficient[i] - b.coefficient[i]));
   }
+  const double size = std::max(size_a, size_b);
   return size > 0 ? off / size : 0;
 }
 

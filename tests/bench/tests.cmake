@@ -5,3 +5,7 @@ set_tests_properties(Bench.EffectsAreJudgedRightly PROPERTIES LABELS bench TIMEO
 add_test(NAME Bench.CompareTellsSlowerFromNoise
   COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_LIST_DIR}/compare_test.py)
 set_tests_properties(Bench.CompareTellsSlowerFromNoise PROPERTIES LABELS bench TIMEOUT 60)
+add_test(NAME Bench.PerceptualDifferenceIsFlip
+  COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_LIST_DIR}/perceptual_test.py)
+set_tests_properties(Bench.PerceptualDifferenceIsFlip PROPERTIES LABELS bench TIMEOUT 60
+  SKIP_REGULAR_EXPRESSION "SKIPPED")

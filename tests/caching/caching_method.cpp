@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <string>
 
 #include "caching/motion_plan.h"
@@ -188,6 +189,41 @@ TEST(MotionPlan, SaysWhatMoves) {
   const MotionPlan still = plan_motion(AnimatedScene(file));
   std::filesystem::remove(file);
   EXPECT_EQ(still.method, MotionPlan::Method::prt) << still.why;
+}
+
+TEST(MotionPlan, InteractionIsWhatAPersonTouches) {
+  const AnimatedScene& scene = demo("cube-in-box");
+  const AnimatedFrame frame = scene.at(0);
+  double area[2] = {};
+  std::map<std::uint32_t, int> triangles;
+  for (std::uint32_t t = 0; t < frame.scene.triangle.size(); ++t) ++triangles[scene.instance_of(t)];
+  Vec3 low{1e9, 1e9, 1e9}, high{-1e9, -1e9, -1e9}, low_all = low, high_all = high;
+  for (std::uint32_t t = 0; t < frame.scene.triangle.size(); ++t) {
+    const auto& v = frame.scene.triangle[t].vertex;
+    const Vec3 &a = frame.scene.position[v[0]], &b = frame.scene.position[v[1]],
+               &c = frame.scene.position[v[2]];
+    const bool cube = triangles[scene.instance_of(t)] == 12;  // walls have 2
+    area[cube] += 0.5 * length(cross(b - a, c - a));
+    for (const Vec3& p : {a, b, c}) {
+      const auto grow = [&p](Vec3& l, Vec3& h) {
+        l = {std::min(l.x, p.x), std::min(l.y, p.y), std::min(l.z, p.z)};
+        h = {std::max(h.x, p.x), std::max(h.y, p.y), std::max(h.z, p.z)};
+      };
+      grow(low_all, high_all);
+      if (cube) grow(low, high);
+    }
+  }
+  const auto surface = [](const Vec3& d) { return d.x * d.y + d.y * d.z + d.z * d.x; };
+  const double passed = surface(high - low) / surface(high_all - low_all);
+  const double on_it = area[1] / (area[0] + area[1]);
+  const MotionPlan plan = plan_interaction(scene);
+  EXPECT_EQ(plan.method, MotionPlan::Method::tic) << plan.why;
+  EXPECT_NEAR(plan.touched, passed + on_it - passed * on_it, 1e-9);
+  EXPECT_GT(plan.touched, 0.02);
+  EXPECT_LT(plan.touched, 0.5);
+  // One of many balls touches less than one cube.
+  EXPECT_LT(plan_interaction(demo("spheres")).touched, plan.touched);
+  EXPECT_NE(plan.why.find("of 1 bodies"), std::string::npos) << plan.why;
 }
 
 TEST(CachingMethod, StopsWhenTold) {
