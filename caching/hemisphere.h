@@ -52,7 +52,7 @@ struct SeenPlace {
 /// Fills in the light that arrives at `at`, a place in the tracer's frame: what surfaces send after
 /// at least one reflection, all further bounces by paths, and the background. What surfaces shine
 /// by themselves is left out: that is direct light. Directions below the triangle see nothing, at
-/// no distance that counts. Surfaces that lamps make bright are also looked at by themselves, 64
+/// no distance that counts. Surfaces that lamps make bright are also looked at by themselves, 256
 /// times, weighted against the strata by the balance heuristic (Veach 1997, section 9.2). `seen`,
 /// if wanted, gets one entry a stratum, then one a look that found something.
 void gather_hemisphere(const FrameTracer& tracer, const PlaceFrame& at, std::uint64_t key,
