@@ -44,9 +44,8 @@ void Collector::print_summary() const {
   if (const Case* gaps = find("machine.gaps")) {
     fmt::print(
         "  spinning threads lose {:.2f} % of their time in gaps above 0.1 ms; {:.2f} % of 4 ms "
-        "frames "
-        "meet one above 0.4 ms\n",
-        gaps->counters.at("lost_percent"), gaps->counters.at("frames_hit_percent"));
+        "frames meet one above 0.4 ms\n",
+        gaps->counters.at("lost_percent"), gaps->counters.at("hit_percent_4ms"));
   }
   const Case* pbi = find("frame.pbi.k30");
   const Case* nwa = find("frame.nwa.k30");

@@ -172,6 +172,7 @@ RelightStats ClusterRelighter::apply(const LightingUpdate& update) {
 }
 
 void ClusterRelighter::expect_resets(bool expected) { state_->vectors.expect_resets(expected); }
+void ClusterRelighter::keep_logs_short(bool keep) { state_->vectors.keep_logs_short(keep); }
 const RowSums* ClusterRelighter::row_sums() const { return &state_->vectors; }
 void ClusterRelighter::set_exact(bool exact) { state_->exact = exact; }
 bool ClusterRelighter::settled() const { return state_->vertices.settled(); }

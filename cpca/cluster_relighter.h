@@ -33,6 +33,7 @@ class ClusterRelighter final : public Relighter {
   const Camera& camera() const override;
   RelightStats apply(const LightingUpdate& update) override;
   void expect_resets(bool expected) override;
+  void keep_logs_short(bool keep) override;
   const RowSums* row_sums() const override;
   void set_exact(bool exact) override;
   bool settled() const override;

@@ -46,7 +46,8 @@ void finish_chunk(const Transport& transport, int chunk, const double* totals,
 
 }  // namespace
 
-RelightStats apply_and_finish(RowSums& sums, const LightingUpdate& update, std::span<Rgb> outputs) {
+RelightStats apply_and_finish(RowSums& sums, const LightingUpdate& update, std::span<Rgb> outputs,
+                              UpdatePart part) {
   // Chunks finish inside the streaming loop; the time they take there is measured apart and shared
   // out over the threads that took it.
   std::atomic<std::int64_t> finishing{0};
@@ -58,7 +59,7 @@ RelightStats apply_and_finish(RowSums& sums, const LightingUpdate& update, std::
     finishing.fetch_add((Clock::now() - chunk_begin).count(), std::memory_order_relaxed);
   };
   // By reference: a std::function would take the heap for its three captures.
-  stats.apply = sums.apply(update, std::ref(finish_timed));
+  stats.apply = sums.apply(update, std::ref(finish_timed), part);
   const double all = milliseconds(Clock::now() - begin);
   const double finish =
       milliseconds(Clock::duration(finishing.load())) / static_cast<double>(thread_count());

@@ -12,8 +12,9 @@
 namespace haarlight {
 
 /// Applies an update to `sums` and writes the coloured sums of every chunk that changed to
-/// `outputs`, transport.info().output_count() of them.
-RelightStats apply_and_finish(RowSums& sums, const LightingUpdate& update, std::span<Rgb> outputs);
+/// `outputs`, transport.info().output_count() of them; of a first part, nothing.
+RelightStats apply_and_finish(RowSums& sums, const LightingUpdate& update, std::span<Rgb> outputs,
+                              UpdatePart part = UpdatePart::whole);
 
 /// The update that shows all of `lighting` where nothing was shown. Throws
 /// Error{invalid_argument} unless it is layout.size() coefficients.

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <utility>
@@ -130,20 +131,16 @@ ErrorJudge& FrameRelighter::estimator() {
   return *errors_;
 }
 
-const LightingUpdate& FrameRelighter::decide(std::span<const Rgb> target, FrameStart start) {
-  if (start == FrameStart::exact) return tracker_.start_exact(target);
-  if (tracker_.options().method == LightingMethod::reference) return tracker_.advance(target);
-  switch (budget_.kind) {
-    case BudgetKind::milliseconds:
-      return tracker_.advance(target, *time_);
-    case BudgetKind::error: {
-      ErrorLimit limit(*errors_, budget_.value);
-      return tracker_.advance(target, limit);
-    }
-    case BudgetKind::wavelets:
-      break;
+// A frame under a time begins: what it would move beside columns.
+void FrameRelighter::start_clock(Clock::time_point begin) {
+  const RowSums* sums = relighter_->row_sums();
+  reset_bytes_.resize(static_cast<std::size_t>(transport().layout().band_count()));
+  for (std::size_t b = 0; b < reset_bytes_.size(); ++b) {
+    const int band = static_cast<int>(b);
+    reset_bytes_[b] = sums ? cost(sums->reset_bytes(band), sums->reset_runs(band)) : 0;
   }
-  return tracker_.advance(target);
+  time_->start(budget_.value, begin, reset_bytes_,
+               sums ? cost(sums->fold_bytes(), sums->fold_runs()) : 0, relighter_->takes_parts());
 }
 
 // What vertices weigh in the picture from where the camera is, which the relighter has looked from.
@@ -185,62 +182,96 @@ void FrameRelighter::follow_flicker() {
   reference_before_ = exact;
 }
 
+// Decides which wavelets change, streams their columns and makes the picture, in one part or two.
+RelightStats FrameRelighter::go(std::span<const Rgb> target, FrameStart start, BudgetKind kind,
+                                const std::optional<FrameCourse>& repeated) {
+  const LightingOptions& lighting = tracker_.options();
+  const bool limited = start != FrameStart::exact && lighting.method != LightingMethod::reference;
+  const bool timed = kind == BudgetKind::milliseconds;
+  relighter_->keep_logs_short(timed || (repeated && repeated->timed));
+  if (kind == BudgetKind::error) estimator();
+  if (timed && !time_) time_.emplace(column_costs(transport(), relighter_->row_sums()));
+
+  const Clock::time_point begin = Clock::now();
+  if (kind == BudgetKind::error && judged_from_ != relighter_->camera()) {
+    // A relighter looks when it applies, whatever that changes.
+    relighter_->set_exact(true);
+    relighter_->apply({});
+    know_view();
+  }
+  std::optional<ErrorLimit> error;
+  std::optional<CourseLimit> course;
+  UpdateLimit* limit = nullptr;
+  if (timed) {
+    start_clock(begin);
+    limit = &*time_;
+  } else if (kind == BudgetKind::error) {
+    limit = &error.emplace(*errors_, budget_.value);
+  } else if (repeated && repeated->timed) {
+    limit = &course.emplace(*repeated, lighting.wavelets);
+  }
+  const LightingUpdate& update = start == FrameStart::exact ? tracker_.start_exact(target)
+                                 : limit && limited         ? tracker_.advance(target, *limit)
+                                                            : tracker_.advance(target);
+  metrics_.update_ms = milliseconds(begin, Clock::now());
+  metrics_.course = repeated.value_or(FrameCourse{timed, 0, {}});
+  relighter_->set_exact(!limited || kind == BudgetKind::error);
+  update_.reset = update.reset;
+  update_.deltas.assign(update.deltas.begin(), update.deltas.end());
+
+  const bool parts = limited && relighter_->takes_parts() && !update.empty() &&
+                     (timed || (course && repeated->first > 0));
+  RelightStats stats, first;
+  if (parts) {
+    first = relighter_->apply_first(update);
+    const Clock::time_point resumed = Clock::now();
+    if (timed) time_->resume();
+    if (course) course->resume();
+    const LightingUpdate& rest = tracker_.extend(*limit);
+    metrics_.update_ms += milliseconds(resumed, Clock::now());
+    stats = relighter_->apply(rest);
+    update_.deltas.insert(update_.deltas.end(), rest.deltas.begin(), rest.deltas.end());
+  } else {
+    stats = relighter_->apply(update);
+  }
+  metrics_.total_ms = milliseconds(begin, Clock::now());
+  stats.add(first);
+  if (timed && limited) {
+    time_->finish(metrics_.total_ms);
+    metrics_.course.put_off = time_->put_off();
+    if (update_.deltas.size() > update.deltas.size()) {
+      metrics_.course.first = static_cast<int>(update.deltas.size());
+    }
+  }
+  std::sort(update_.deltas.begin(), update_.deltas.end(),
+            [](const WaveletDelta& a, const WaveletDelta& b) { return a.index < b.index; });
+  return stats;
+}
+
 const FrameMetrics& FrameRelighter::relight(std::span<const Rgb> target, FrameStart start,
                                             int frame) {
   if (start == FrameStart::dark) go_dark();
   const HaarLayout& layout = transport().layout();
   const LightingOptions& lighting = tracker_.options();
 
-  // Decide which wavelets change, stream their columns, make the picture.
-  if (budget_.kind == BudgetKind::error) estimator();
-  if (budget_.kind == BudgetKind::milliseconds && !time_)
-    time_.emplace(column_costs(transport(), relighter_->row_sums()));
-  const Clock::time_point begin = Clock::now();
-  if (budget_.kind == BudgetKind::error && judged_from_ != relighter_->camera()) {
-    // A relighter looks when it applies, whatever that changes.
-    relighter_->set_exact(true);
-    relighter_->apply({});
-    know_view();
-  }
-  if (budget_.kind == BudgetKind::milliseconds) {
-    const RowSums* sums = relighter_->row_sums();
-    reset_bytes_.resize(static_cast<std::size_t>(layout.band_count()));
-    for (int b = 0; b < layout.band_count(); ++b) {
-      reset_bytes_[static_cast<std::size_t>(b)] =
-          sums ? cost(sums->reset_bytes(b), sums->reset_runs(b)) : 0;
-    }
-    time_->start(budget_.value, begin, reset_bytes_,
-                 sums ? cost(sums->fold_bytes(), sums->fold_runs()) : 0);
-  }
-  const LightingUpdate& update = decide(target, start);
-  const Clock::time_point decided = Clock::now();
-  relighter_->set_exact(start == FrameStart::exact ||
-                        lighting.method == LightingMethod::reference ||
-                        budget_.kind == BudgetKind::error);
-  const RelightStats stats = relighter_->apply(update);
-  const Clock::time_point end = Clock::now();
-  update_ = &update;
+  const std::optional<FrameCourse> course = std::exchange(repeat_, std::nullopt);
+  const BudgetKind kind = course ? BudgetKind::wavelets : budget_.kind;
+  const RelightStats stats = go(target, start, kind, course);
 
   metrics_.frame = frame;
   metrics_.method = lighting.method;
   metrics_.wavelets = lighting.method == LightingMethod::reference ? layout.size()
-                      : budget_.kind == BudgetKind::wavelets
-                          ? lighting.wavelets
-                          : static_cast<int>(update.deltas.size());
+                      : kind == BudgetKind::wavelets               ? lighting.wavelets
+                                                     : static_cast<int>(update_.deltas.size());
   metrics_.weight = weight_;
-  metrics_.updates = static_cast<int>(update.deltas.size());
+  metrics_.updates = static_cast<int>(update_.deltas.size());
   metrics_.resets.clear();
   for (int b = 0; b < layout.band_count(); ++b) {
-    metrics_.resets += update.reset[static_cast<std::size_t>(b)] ? '1' : '0';
+    metrics_.resets += update_.reset[static_cast<std::size_t>(b)] ? '1' : '0';
   }
   metrics_.lighting_error = lighting_error(layout, tracker_.shown(), target);
-  metrics_.update_ms = milliseconds(begin, decided);
   metrics_.apply_ms = stats.apply_ms;
   metrics_.finish_ms = stats.finish_ms;
-  metrics_.total_ms = milliseconds(begin, end);
-  if (budget_.kind == BudgetKind::milliseconds && start != FrameStart::exact) {
-    time_->finish(metrics_.total_ms);
-  }
   metrics_.bytes = stats.apply.transport_bytes + stats.apply.sum_bytes;
 
   // The same frame under the exact lighting. Both pictures are black where the scene is not, so

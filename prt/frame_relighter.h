@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -12,6 +13,7 @@
 #include "core/image.h"
 #include "prt/error_judge.h"
 #include "prt/frame_budget.h"
+#include "prt/frame_course.h"
 #include "prt/lighting_tracker.h"
 #include "prt/relighter.h"
 #include "prt/scene_view.h"
@@ -44,6 +46,8 @@ struct FrameMetrics {
   std::optional<double> flicker;
   /// What an ErrorJudge says of image_rel_rmse without a reference. Not for every renderer.
   std::optional<double> error_estimate, error_bound;
+  /// What a budget in milliseconds decided of the frame by the clock, for FrameRelighter::repeat().
+  FrameCourse course;
   /// What compressing the transport cost, as its file states: relative RMS of the picture under the
   /// worst of the lightings it was measured under. None where the file does not say.
   std::optional<double> transport_error;
@@ -78,6 +82,10 @@ class FrameRelighter {
   /// Error{invalid_argument} for a value out of range, or an error where none can be estimated.
   void set_budget(const FrameBudget& budget);
 
+  /// The next frame goes as one of `course` went, with the wavelets of the options, whatever the
+  /// budget: the same picture, bit for bit.
+  void repeat(const FrameCourse& course) { repeat_ = course; }
+
   /// Relights towards `target`, layout.size() coefficients, valid until the next call; the frame's
   /// number is the caller's. Throws as LightingTracker::advance, and then changes nothing.
   const FrameMetrics& relight(std::span<const Rgb> target, FrameStart start, int frame);
@@ -93,12 +101,14 @@ class FrameRelighter {
   const LightingTracker& tracker() const { return tracker_; }
   /// Whether an empty update would leave the picture as it is.
   bool settled() const { return relighter_->settled(); }
-  const LightingUpdate& update() const { return *update_; }
+  const LightingUpdate& update() const { return update_; }
   const Transport& transport() const { return relighter_->transport(); }
 
  private:
   void go_dark();
-  const LightingUpdate& decide(std::span<const Rgb> target, FrameStart start);
+  void start_clock(std::chrono::steady_clock::time_point begin);
+  RelightStats go(std::span<const Rgb> target, FrameStart start, BudgetKind kind,
+                  const std::optional<FrameCourse>& repeated);
   ErrorJudge& estimator();
   void know_view();
   void judge(std::span<const Rgb> target);
@@ -115,6 +125,7 @@ class FrameRelighter {
   std::optional<Exact> exact_;
   bool compare_ = false;
   FrameBudget budget_;
+  std::optional<FrameCourse> repeat_;
   std::optional<TimeBudget> time_;      // of the last frames; made when first asked for
   std::unique_ptr<ErrorJudge> errors_;  // likewise
   bool judge_ = false;
@@ -125,7 +136,7 @@ class FrameRelighter {
   std::optional<double> transport_error_;
   bool compared_before_ = false;
   Image picture_before_, reference_before_;  // of the last frame that was compared, or empty
-  const LightingUpdate* update_ = nullptr;
+  LightingUpdate update_;                    // of the frame, all parts together
   FrameMetrics metrics_;
 };
 

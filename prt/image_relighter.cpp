@@ -25,8 +25,8 @@ const Transport& checked(const Transport& transport) {
 ImageRelighter::ImageRelighter(Transport transport)
     : sums_(checked(transport)), picture_(sums_.transport().width(), sums_.transport().height()) {}
 
-RelightStats ImageRelighter::apply(const LightingUpdate& update) {
-  return apply_and_finish(sums_, update, picture_.pixels);
+RelightStats ImageRelighter::apply(const LightingUpdate& update, UpdatePart part) {
+  return apply_and_finish(sums_, update, picture_.pixels, part);
 }
 
 Image relight_once(const Transport& transport, std::span<const Rgb> lighting) {

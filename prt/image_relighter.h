@@ -19,9 +19,11 @@ class ImageRelighter {
   /// Throws Error{invalid_argument} for the transport of a mesh.
   explicit ImageRelighter(Transport transport);
 
-  RelightStats apply(const LightingUpdate& update);
+  /// See RowSums::apply for parts.
+  RelightStats apply(const LightingUpdate& update, UpdatePart part = UpdatePart::whole);
   /// See RowSums::expect_resets.
   void expect_resets(bool expected) { sums_.expect_resets(expected); }
+  void keep_logs_short(bool keep) { sums_.keep_logs_short(keep); }
   const RowSums& sums() const { return sums_; }
   const Image& picture() const { return picture_; }
   const Transport& transport() const { return sums_.transport(); }

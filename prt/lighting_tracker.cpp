@@ -211,12 +211,23 @@ BandMask LightingTracker::choose_bands_exhaustively(int wavelets) {
   return BandMask(best);
 }
 
-void LightingTracker::show(std::span<const Rgb> target, int index) {
+// The next of the ranking, for as long as the limit takes them.
+void LightingTracker::take_ranked(std::span<const Rgb> target, UpdateLimit& limit) {
+  chosen_.clear();
+  for (; next_ranked_ >= 0; next_ranked_ = ranked_.next()) {
+    const auto k = static_cast<std::size_t>(next_ranked_);
+    if (!limit.take(next_ranked_, target[k] - shown_[k])) break;
+    chosen_.push_back(next_ranked_);
+  }
+  std::sort(chosen_.begin(), chosen_.end());
+}
+
+void LightingTracker::show(std::span<const Rgb> target, int index, LightingUpdate& update) {
   const auto k = static_cast<std::size_t>(index);
   // Against what was really handed out, so that a rounded delta (a coefficient that fell by more
   // than 2^29) is made good by the next one instead of staying for ever.
   const RgbD delta = RgbD(target[k]) - emitted_[k];
-  update_.deltas.push_back({index, delta});
+  update.deltas.push_back({index, delta});
   emitted_[k] += delta;
   shown_[k] = target[k];
 }
@@ -236,11 +247,12 @@ const LightingUpdate& LightingTracker::advance(std::span<const Rgb> wanted, Upda
                              : options_.wavelets;
   update_.reset.reset();
   update_.deltas.clear();
+  next_ranked_ = -1;
 
   if (options_.method == LightingMethod::reference) {
     for (int i = 0; i < layout_.size(); ++i) {
       const auto k = static_cast<std::size_t>(i);
-      if (!(target[k] == shown_[k])) show(target, i);
+      if (!(target[k] == shown_[k])) show(target, i, update_);
     }
     return update_;
   }
@@ -254,6 +266,11 @@ const LightingUpdate& LightingTracker::advance(std::span<const Rgb> wanted, Upda
     update_.reset = options_.band_choice == BandChoice::simple
                         ? choose_bands_simply()
                         : choose_bands_exhaustively(expected);
+    if (limit && update_.reset.any()) {
+      std::array<double, HaarLayout::kMaxBands> gain{};
+      for (std::size_t b = 0; b < bands; ++b) gain[b] = keep_norm_[b] - reset_norm_[b];
+      update_.reset &= limit->allow(update_.reset, gain);
+    }
   }
 
   // Forget the reset bands (line 14) and pick wavelets over all bands together (line 3).
@@ -267,33 +284,36 @@ const LightingUpdate& LightingTracker::advance(std::span<const Rgb> wanted, Upda
     }
   }
   if (limit) {
-    chosen_.clear();
     limit->begin(target, shown_, update_.reset);
     ranked_.start(key_);
-    for (int index = ranked_.next(); index >= 0; index = ranked_.next()) {
-      const auto k = static_cast<std::size_t>(index);
-      if (!limit->take(index, target[k] - shown_[k])) break;
-      chosen_.push_back(index);
-    }
-    std::sort(chosen_.begin(), chosen_.end());
+    next_ranked_ = ranked_.next();
+    take_ranked(target, *limit);
   } else {
     top_k_.select(key_, options_.wavelets, chosen_);
   }
 
   // Bring the chosen ones up to date (lines 8-11 and 15-18; Eqs. 5 and 6).
-  for (int index : chosen_) show(target, index);
+  for (int index : chosen_) show(target, index, update_);
   return update_;
+}
+
+const LightingUpdate& LightingTracker::extend(UpdateLimit& limit) {
+  rest_.deltas.clear();
+  take_ranked(target_, limit);
+  for (int index : chosen_) show(target_, index, rest_);
+  return rest_;
 }
 
 const LightingUpdate& LightingTracker::start_exact(std::span<const Rgb> wanted) {
   const std::span<const Rgb> target = take_in(wanted);
   update_.reset.reset();
   update_.deltas.clear();
+  next_ranked_ = -1;
   for (int b = 0; b < layout_.band_count(); ++b) update_.reset[static_cast<std::size_t>(b)] = true;
   std::fill(shown_.begin(), shown_.end(), Rgb{});
   std::fill(emitted_.begin(), emitted_.end(), RgbD{});
   for (int i = 0; i < layout_.size(); ++i) {
-    if (!(target[static_cast<std::size_t>(i)] == Rgb{})) show(target, i);
+    if (!(target[static_cast<std::size_t>(i)] == Rgb{})) show(target, i, update_);
   }
   return update_;
 }

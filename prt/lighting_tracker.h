@@ -73,6 +73,11 @@ class LightingTracker {
   /// the ranking are those that advance() chooses for wavelets = n (and simple band choice).
   const LightingUpdate& advance(std::span<const Rgb> target, UpdateLimit& limit);
 
+  /// More of the same frame: goes on in the ranking where the last advance() under a limit, or the
+  /// last extend() after it, was told no. Returns the further deltas, without resets; valid until
+  /// the next call. What advance() returned stays as it is.
+  const LightingUpdate& extend(UpdateLimit& limit);
+
   /// Shows `target` in full, as at the start of a sequence (Overbeck 2006, section 3, sets
   /// L~0 = L0): every band reset, every non-zero coefficient in the update. Same errors.
   const LightingUpdate& start_exact(std::span<const Rgb> target);
@@ -91,7 +96,8 @@ class LightingTracker {
   void rank(std::span<const Rgb> target);
   BandMask choose_bands_simply() const;
   BandMask choose_bands_exhaustively(int wavelets);
-  void show(std::span<const Rgb> target, int index);
+  void take_ranked(std::span<const Rgb> target, UpdateLimit& limit);
+  void show(std::span<const Rgb> target, int index, LightingUpdate& update);
 
   HaarLayout layout_;
   LightingOptions options_;
@@ -100,7 +106,8 @@ class LightingTracker {
   std::vector<Rgb> shown_;
   std::vector<RgbD>
       emitted_;  // sum of all deltas since the band was last reset, as consumers have it
-  LightingUpdate update_;
+  LightingUpdate update_, rest_;
+  int next_ranked_ = -1;  // the next to be asked for; -1: there is none
 
   // Scratch of one frame, all reused.
   std::vector<float> keep_key_, reset_key_;  // weight * |D| for either choice

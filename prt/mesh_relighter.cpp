@@ -23,8 +23,8 @@ Transport checked(Transport transport) {
 MeshRelighter::MeshRelighter(Transport transport)
     : sums_(checked(std::move(transport))), radiance_(sums_.transport().info().output_count()) {}
 
-RelightStats MeshRelighter::apply(const LightingUpdate& update) {
-  return apply_and_finish(sums_, update, radiance_);
+RelightStats MeshRelighter::apply(const LightingUpdate& update, UpdatePart part) {
+  return apply_and_finish(sums_, update, radiance_, part);
 }
 
 }  // namespace haarlight

@@ -18,9 +18,11 @@ class MeshRelighter {
   /// Throws Error{invalid_argument} for the transport of a picture.
   explicit MeshRelighter(Transport transport);
 
-  RelightStats apply(const LightingUpdate& update);
+  /// See RowSums::apply for parts.
+  RelightStats apply(const LightingUpdate& update, UpdatePart part = UpdatePart::whole);
   /// See RowSums::expect_resets.
   void expect_resets(bool expected) { sums_.expect_resets(expected); }
+  void keep_logs_short(bool keep) { sums_.keep_logs_short(keep); }
   const RowSums& sums() const { return sums_; }
   /// One an output, W m^-2 sr^-1: vertex * terms + term, so one a vertex where terms is 1.
   std::span<const Rgb> radiance() const { return radiance_; }

@@ -125,6 +125,39 @@ json camera_json(const Camera& camera) {
           {"height", camera.height}};
 }
 
+FrameCourse course_from(const json& value, const std::string& at) {
+  if (!value.is_object()) refuse(at, "is " + value.dump() + ", expected an object");
+  FrameCourse course;
+  course.timed = true;
+  for (const auto& [key, entry] : value.items()) {
+    const std::string inner = at + "." + key;
+    if (key == "first") {
+      course.first = integer(entry, inner);
+    } else if (key == "put_off") {
+      if (!entry.is_array()) refuse(inner, "is " + entry.dump() + ", expected a list of bands");
+      for (const json& band : entry) {
+        const int b = integer(band, inner);
+        if (b >= HaarLayout::kMaxBands) {
+          refuse(inner, fmt::format("has {}, expected bands below {}", b, HaarLayout::kMaxBands));
+        }
+        course.put_off[static_cast<std::size_t>(b)] = true;
+      }
+    } else {
+      refuse(inner, "is no key of a frame under a time");
+    }
+  }
+  return course;
+}
+
+json course_json(const FrameCourse& course) {
+  json out = json::object();
+  if (course.first > 0) out["first"] = course.first;
+  for (std::size_t b = 0; b < course.put_off.size(); ++b) {
+    if (course.put_off[b]) out["put_off"].push_back(b);
+  }
+  return out;
+}
+
 void read_key(const std::string& key, const json& value, const std::string& at,
               RecordedFrame& frame) {
   if (key == "from") {
@@ -151,6 +184,8 @@ void read_key(const std::string& key, const json& value, const std::string& at,
   } else if (key == "wavelets") {
     frame.wavelets = integer(value, at);
     if (frame.wavelets < 1) refuse(at, "is 0, expected at least 1");
+  } else if (key == "timed") {
+    frame.course = course_from(value, at);
   } else if (key == "weight") {
     const auto weight = wavelet_weight_from_name(word(value, at));
     if (!weight) refuse(at, "is " + value.dump() + ", expected none, area or transport");
@@ -191,6 +226,7 @@ json frame_json(const RecordedFrame& frame, const RecordedFrame& before) {
   }
   if (frame.method != before.method) out["method"] = lighting_method_name(frame.method);
   if (frame.wavelets != before.wavelets) out["wavelets"] = frame.wavelets;
+  if (frame.course.timed) out["timed"] = course_json(frame.course);
   if (frame.weight != before.weight) out["weight"] = wavelet_weight_name(frame.weight);
   if (frame.camera && frame.camera != before.camera) out["camera"] = camera_json(*frame.camera);
   for (const auto& [start, name] : kStarts) {
@@ -237,6 +273,7 @@ MotionRecording parse_motion(const std::string& text, const std::string& name) {
     const std::string where = fmt::format("{}, frame {}", name, recording.frames.size());
     if (!entry.is_object()) refuse(where, "is " + entry.dump() + ", expected an object");
     frame.start = FrameStart::advance;
+    frame.course = {};
     for (const auto& [key, value] : entry.items()) read_key(key, value, where + ", " + key, frame);
     try {
       check_light_state(frame.light, recording.environments.size());

@@ -21,6 +21,7 @@ struct RecordedFrame {
   int wavelets = 30;  ///< the budget that was used, also where it was given in milliseconds; >= 1
   WaveletWeight weight = WaveletWeight::area;
   FrameStart start = FrameStart::advance;
+  FrameCourse course;            ///< of a budget in milliseconds
   std::optional<Camera> camera;  ///< of a mesh; none: the file's
   bool operator==(const RecordedFrame&) const = default;
 };

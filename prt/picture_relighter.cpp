@@ -38,6 +38,7 @@ struct PictureRelighter::State {
   Image picture;                     // of the mesh
   Camera camera;
   bool looked = false, shaded = false;
+  UpdatePart next = UpdatePart::whole;  // rest: a first part was applied
 
   void draw(bool changed);
 };
@@ -98,12 +99,20 @@ void PictureRelighter::set_camera(const Camera& camera) {
 
 RelightStats PictureRelighter::apply(const LightingUpdate& update) {
   State& s = *state_;
-  if (s.image) return s.image->apply(update);
-  RelightStats stats = s.vertices->apply(update);
+  const UpdatePart part = std::exchange(s.next, UpdatePart::whole);
+  if (s.image) return s.image->apply(update, part);
+  RelightStats stats = s.vertices->apply(update, part);
   const Clock::time_point begin = Clock::now();
-  s.draw(!update.empty());
+  s.draw(!update.empty() || part == UpdatePart::rest);
   stats.finish_ms += std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
   return stats;
+}
+
+RelightStats PictureRelighter::apply_first(const LightingUpdate& update) {
+  State& s = *state_;
+  s.next = UpdatePart::rest;
+  return s.image ? s.image->apply(update, UpdatePart::first)
+                 : s.vertices->apply(update, UpdatePart::first);
 }
 
 void PictureRelighter::expect_resets(bool expected) {
@@ -111,6 +120,14 @@ void PictureRelighter::expect_resets(bool expected) {
     state_->image->expect_resets(expected);
   } else {
     state_->vertices->expect_resets(expected);
+  }
+}
+
+void PictureRelighter::keep_logs_short(bool keep) {
+  if (state_->image) {
+    state_->image->keep_logs_short(keep);
+  } else {
+    state_->vertices->keep_logs_short(keep);
   }
 }
 

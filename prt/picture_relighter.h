@@ -23,7 +23,10 @@ class PictureRelighter final : public Relighter {
   void set_camera(const Camera& camera) override;
   const Camera& camera() const override;
   RelightStats apply(const LightingUpdate& update) override;
+  bool takes_parts() const override { return true; }
+  RelightStats apply_first(const LightingUpdate& update) override;
   void expect_resets(bool expected) override;
+  void keep_logs_short(bool keep) override;
   const Image& picture() const override;
   std::span<const float> coverage() const override;
   const Transport& transport() const override;

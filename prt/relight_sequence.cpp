@@ -93,6 +93,7 @@ void relight_recording(const Transport& transport, std::span<const Environment> 
     const std::span<const Rgb> target = rig.coefficients(frame.light);
     relighter.set_options(options_of(frame), frame.weight);
     if (frame.camera) relighter.set_camera(*frame.camera);
+    if (frame.course.timed) relighter.repeat(frame.course);
     hand_out(relighter, relighter.relight(target, frame.start, i), target, frames, frame_done);
   }
 }

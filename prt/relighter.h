@@ -31,8 +31,18 @@ class Relighter {
 
   /// Applies the update and draws what changed by it or by set_camera().
   virtual RelightStats apply(const LightingUpdate& update) = 0;
+  /// Whether a frame's update may come in two parts: apply_first(), which leaves the picture as it
+  /// is, and apply() for the rest, which may be empty.
+  virtual bool takes_parts() const { return false; }
+  /// The first part. Requires takes_parts(), and that the next call is apply().
+  virtual RelightStats apply_first(const LightingUpdate& update) {
+    static_cast<void>(update);
+    return {};
+  }
   /// See RowSums::expect_resets.
   virtual void expect_resets(bool expected) = 0;
+  /// See RowSums::keep_logs_short.
+  virtual void keep_logs_short(bool keep) = 0;
   /// Whether the next apply() shows T * shown in full, at whatever cost, rather than step by step.
   /// For renderers that always do, nothing.
   virtual void set_exact(bool exact) { static_cast<void>(exact); }

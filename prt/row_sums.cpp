@@ -22,6 +22,7 @@ namespace {
 // sums, its oldest columns first, about one picture's worth in a frame: so much more than a read
 // and a write of the picture that no time is lost by folding in parts, and no frame waits long.
 constexpr std::uint64_t kFoldPictures = 4;
+constexpr std::uint64_t kShortPictures = 1;
 
 // Above so many columns a chunk's runs are next to each other or past what caches hold.
 constexpr std::size_t kPrefetchColumns = 512;
@@ -50,6 +51,7 @@ struct RowSums::State {
     const auto columns = static_cast<std::size_t>(transport.layout().size());
     totals.resize(chunks * kChunkTotals);
     chunk_lit.assign(chunks, 0);
+    chunk_untold.assign(chunks, 0);
     shown.resize(columns);
     in_shown.assign(columns, 0);
     logged.resize(columns);
@@ -70,7 +72,8 @@ struct RowSums::State {
 
   Transport transport;
   HugePageVector<double> totals;
-  std::vector<std::uint8_t> chunk_lit;  // a chunk of totals holds something other than +0
+  std::vector<std::uint8_t> chunk_lit;     // a chunk of totals holds something other than +0
+  std::vector<std::uint8_t> chunk_untold;  // changed by a first part
 
   // What of each band is in the totals: its kept picture (if lit) plus its log.
   struct Band {
@@ -91,7 +94,7 @@ struct RowSums::State {
   std::vector<std::uint32_t> runs_of;  // chunks that have a column
 
   std::vector<WaveletDelta> columns_scratch;
-  bool expect_resets = true;
+  bool expect_resets = true, short_logs = false;
 
   // Follows the lighting itself; true if anything is lit afterwards.
   bool follow(const LightingUpdate& update) {
@@ -136,8 +139,9 @@ struct RowSums::State {
   // The band with the longest log that is to be folded; null if none is.
   Band* to_fold() {
     Band* longest = nullptr;
+    const std::uint64_t pictures = short_logs ? kShortPictures : kFoldPictures;
     for (Band& b : band) {
-      const std::uint64_t least = longest ? longest->log_bytes : kFoldPictures * picture_bytes();
+      const std::uint64_t least = longest ? longest->log_bytes : pictures * picture_bytes();
       if (expect_resets && b.log_bytes > least) longest = &b;
     }
     return longest;
@@ -153,11 +157,11 @@ struct RowSums::State {
   }
 
   // Streams columns into rows laid out as totals; returns the bytes of sums read and written for
-  // them. `before` prepares a chunk and says whether it changed something; `done` is called for
-  // changed chunks.
-  template <typename Before>
+  // them. `before` prepares a chunk and says whether it changed something; `after` is told whether
+  // the chunk changed.
+  template <typename Before, typename After>
   std::uint64_t stream(std::span<const WaveletDelta> columns, HugePageVector<double>& sums,
-                       const Before& before, const ChunkDone& done) {
+                       const Before& before, const After& after) {
     std::atomic<std::uint64_t> blocks_touched{0};
     parallel_for(transport.chunk_count(), [&](int chunk) {
       thread_local std::vector<ColumnTask> tasks;
@@ -173,10 +177,11 @@ struct RowSums::State {
       }
       double* chunk_sums = sums.data() + static_cast<std::size_t>(chunk) * kChunkTotals;
       const bool changed = before(chunk, chunk_sums, !tasks.empty());
-      if (tasks.empty() && !changed) return;
-      apply_columns(transport.rgb_blocks(chunk), tasks, chunk_sums);
-      blocks_touched.fetch_add(touched_blocks(tasks), std::memory_order_relaxed);
-      if (done) done(chunk, chunk_sums);
+      if (!tasks.empty()) {
+        apply_columns(transport.rgb_blocks(chunk), tasks, chunk_sums);
+        blocks_touched.fetch_add(touched_blocks(tasks), std::memory_order_relaxed);
+      }
+      after(chunk, chunk_sums, changed || !tasks.empty());
     });
     return 2 * blocks_touched.load() * kBlockTotals * sizeof(double);
   }
@@ -200,12 +205,13 @@ struct RowSums::State {
               [](const WaveletDelta& x, const WaveletDelta& y) { return x.index < y.index; });
     const bool fresh = !b.kept_lit;
     if (b.kept.empty()) b.kept.resize(totals.size());
-    stats.sum_bytes += stream(columns_scratch, b.kept,
-                              [&](int, double* sums, bool) {
-                                if (fresh) std::fill(sums, sums + kChunkTotals, 0.0);
-                                return fresh;
-                              },
-                              {});
+    stats.sum_bytes += stream(
+        columns_scratch, b.kept,
+        [&](int, double* sums, bool) {
+          if (fresh) std::fill(sums, sums + kChunkTotals, 0.0);
+          return fresh;
+        },
+        [](int, const double*, bool) {});
     if (fresh) stats.sum_bytes += picture_bytes();
     stats.transport_bytes += folded;
     stats.columns += static_cast<int>(columns_scratch.size());
@@ -218,7 +224,7 @@ RowSums::~RowSums() = default;
 RowSums::RowSums(RowSums&&) noexcept = default;
 RowSums& RowSums::operator=(RowSums&&) noexcept = default;
 
-ApplyStats RowSums::apply(const LightingUpdate& update, const ChunkDone& done) {
+ApplyStats RowSums::apply(const LightingUpdate& update, const ChunkDone& done, UpdatePart part) {
   State& s = *state_;
   ApplyStats stats;
   const auto bands = static_cast<std::size_t>(s.transport.layout().band_count());
@@ -231,7 +237,8 @@ ApplyStats RowSums::apply(const LightingUpdate& update, const ChunkDone& done) {
   }
   from_zero |= !lit;
 
-  State::Band* longest = from_zero || update.empty() ? nullptr : s.to_fold();
+  const bool may_fold = part != UpdatePart::rest && !from_zero && !update.empty();
+  State::Band* longest = may_fold ? s.to_fold() : nullptr;
   if (longest && !update.reset[static_cast<std::size_t>(longest - s.band.data())]) {
     s.fold(*longest, s.picture_bytes(), stats);
   }
@@ -311,17 +318,26 @@ ApplyStats RowSums::apply(const LightingUpdate& update, const ChunkDone& done) {
         if (has_columns) chunk_lit = 1;
         return changed;
       },
-      done);
+      [&](int chunk, const double* sums, bool changed) {
+        std::uint8_t& untold = s.chunk_untold[static_cast<std::size_t>(chunk)];
+        if (part == UpdatePart::first) {
+          untold |= static_cast<std::uint8_t>(changed);
+        } else if (changed || untold) {
+          untold = 0;
+          if (done) done(chunk, sums);
+        }
+      });
   stats.sum_bytes += prepared.load() * kChunkTotals * sizeof(double);
 
   // A picture that starts anew with all of its light has long logs, and time: frames after it not.
-  if (from_zero) {
+  if (from_zero && part != UpdatePart::rest) {
     while (State::Band* band = s.to_fold()) s.fold(*band, band->log_bytes, stats);
   }
   return stats;
 }
 
 void RowSums::expect_resets(bool expected) { state_->expect_resets = expected; }
+void RowSums::keep_logs_short(bool keep) { state_->short_logs = keep; }
 
 std::uint64_t RowSums::reset_bytes(int band) const {
   const State::Band& b = state_->band[static_cast<std::size_t>(band)];

@@ -31,6 +31,14 @@ struct ApplyStats {
 /// Accuracy: |total - T shown| <= (K + 2n) 2^-53 S, K the updates since the sums were last empty,
 /// n the terms of one sum, S the largest sum |T| |shown| met. When nothing is shown the total is +0
 /// bit for bit.
+/// Of a frame whose update comes in one or in two calls, so that the clock can be looked at between
+/// them.
+enum class UpdatePart {
+  whole,
+  first,  ///< sums alone; who looks at chunks is told by the rest
+  rest,   ///< hands out the chunks of both; may be empty
+};
+
 class RowSums {
  public:
   explicit RowSums(Transport transport);
@@ -45,11 +53,17 @@ class RowSums {
   /// Applies an update. Rows are owned by chunks and each row adds its columns in ascending order,
   /// so the result is the same bits on any number of threads. No heap use once warm, except that a
   /// band's kept picture is allocated when first needed. Requires deltas ascending and in range.
-  ApplyStats apply(const LightingUpdate& update, const ChunkDone& done = {});
+  /// `done` is not called in the first of two parts, and for the chunks of both in the rest, which
+  /// folds no log. A rest must follow its first.
+  ApplyStats apply(const LightingUpdate& update, const ChunkDone& done = {},
+                   UpdatePart part = UpdatePart::whole);
 
   /// Whether single bands will be reset (true from the start). A caller whose bands never are (bi,
   /// reference) says no, and no band's log is folded: no kept pictures, and no time for them.
   void expect_resets(bool expected);
+  /// Whether logs are folded when they are a picture long rather than four: updates move more, and
+  /// the dearest reset half as much. For frames that must not take longer than others.
+  void keep_logs_short(bool keep);
 
   /// Traffic of the next update beside its columns, in bytes: what taking back band `band` would
   /// stream, and what a long log asks for unless its band is reset.

@@ -30,9 +30,13 @@ class FrameTimeModel {
   double fixed_ = 0, per_byte_ = 1 / 4e6;  // 4 GB/s, until something is known
 };
 
-/// Ends updates so that frames stay within a time. It aims below the time by as much as frames have
-/// been slower than predicted lately: all but the slowest of the last 200 would have stayed within
-/// 1.06 times the time asked for. At least 85 % of it is aimed at.
+/// Ends updates so that frames stay within a time. Where the renderer takes a frame in two parts,
+/// the first is to be done after two thirds of the time, whatever the second still costs; then
+/// the clock says what is left for the second, so that a thread that was held up meanwhile makes
+/// the update smaller and not the frame late. It aims below the time by as much as frames have been
+/// slower than predicted lately: all but the slowest of the last 200 would have stayed within 1.04
+/// times the time asked for. At least 85 % of it is aimed at. Bands are reset if taking them back
+/// is foreseen to fit, the most worth it first.
 class TimeBudget final : public UpdateLimit {
  public:
   using Clock = std::chrono::steady_clock;
@@ -42,30 +46,43 @@ class TimeBudget final : public UpdateLimit {
 
   /// A frame begins, now, that is to take `milliseconds`. `reset_bytes` of each band and
   /// `fixed_bytes` are what it would move beside columns.
+  /// `parts`: whether resume() follows.
   void start(double milliseconds, Clock::time_point now, std::span<const double> reset_bytes,
-             double fixed_bytes);
-  /// It took so long, deciding and all.
+             double fixed_bytes, bool parts);
+  /// The first part is applied, now; what is taken from here on is the second.
+  void resume();
+  /// The frame took so long, deciding and all.
   void finish(double milliseconds);
 
+  /// Bands of this frame that were not allowed.
+  const BandMask& put_off() const { return put_off_; }
+
+  BandMask allow(const BandMask& wanted, std::span<const double> gain) override;
   void begin(std::span<const Rgb> target, std::span<const Rgb> shown,
              const BandMask& reset) override;
   bool take(int index, const Rgb& difference) override;
 
-  /// Time that deciding of this frame may be trusted to have taken before begin(): for tests.
+  /// Another clock than the machine's: for tests.
   void set_clock(Clock::time_point (*now)()) { now_ = now; }
 
  private:
   double aim() const;
+  double elapsed() const;
+  double to_take_back(const BandMask& reset) const;
+  void remember(double ratio);
 
   std::vector<double> column_bytes_;
-  FrameTimeModel model_;
+  FrameTimeModel whole_, first_, second_;  // of frames in one part; of either part
   Clock::time_point (*now_)() = &Clock::now;
   std::array<double, HaarLayout::kMaxBands> reset_bytes_{};
 
   // Of the frame.
-  double wanted_ = 0, fixed_bytes_ = 0, begun_ms_ = 0, moved_ = 0, allowed_ = 0;
+  double wanted_ = 0, fixed_bytes_ = 0, begun_ms_ = 0, resumed_ms_ = 0;
+  double moved_ = 0, allowed_ = 0;  // of the part
+  double moved_first_ = 0;
   Clock::time_point started_;
-  bool any_ = false;
+  bool any_ = false, parts_ = false;
+  BandMask put_off_;
 
   double most_moved_ = 0;       // of frames so far: growth is at most twofold
   std::vector<double> slower_;  // measured over predicted time, of the last frames, as a ring

@@ -309,7 +309,7 @@ bool Session::advance(const ViewSettings& settings, double ticks, ViewFrame& out
     std::optional<Camera> camera;
     if (scene_->transport.info().mesh) camera = relighter_->view().camera;
     recording_.frames.push_back(
-        {light_, settings.method, allowed, settings.weight, next_start_, camera});
+        {light_, settings.method, allowed, settings.weight, next_start_, metrics_.course, camera});
   }
   if (!exposure_) {
     exposure_ =

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/image_metrics.h"
 #include "prt/relight_sequence.h"
 #include "tests/prt/fixtures.h"
 
@@ -48,6 +49,7 @@ MotionRecording eventful() {
     frame.method = static_cast<LightingMethod>(i / 3);
     frame.wavelets = 5 + i;
     frame.weight = static_cast<WaveletWeight>(i % 3);
+    if (i % 4 == 1) frame.course = {true, i == 5 ? 3 : 0, i > 5 ? 0b1010u : 0u};
     recording.frames.push_back(frame);
   }
   return recording;
@@ -66,11 +68,15 @@ TEST(MotionFile, ComesBackAsTheSameBits) {
 TEST(MotionFile, FramesSayOnlyWhatTheyChange) {
   const MotionRecording m = parse_motion(
       R"({"format": "haarlight-motion", "version": 1, "environments": ["a.exr"],
-          "frames": [{"start": "exact", "wavelets": 7}, {}, {"method": "nwa"}, {"wavelets": 9}]})",
+          "frames": [{"start": "exact", "wavelets": 7, "timed": {"first": 2}}, {}, {"method": "nwa"},
+                     {"wavelets": 9, "timed": {}}]})",
       "m");
   ASSERT_EQ(m.frames.size(), 4u);
   EXPECT_EQ(m.frames[0].start, FrameStart::exact);
+  EXPECT_EQ(m.frames[0].course.first, 2);
   EXPECT_EQ(m.frames[1].start, FrameStart::advance);
+  EXPECT_EQ(m.frames[1].course, FrameCourse{});
+  EXPECT_TRUE(m.frames[3].course.timed);
   EXPECT_EQ(m.frames[1].wavelets, 7);
   EXPECT_EQ(m.frames[3].method, LightingMethod::nwa);
   EXPECT_EQ(m.frames[3].wavelets, 9);
@@ -121,6 +127,63 @@ TEST(MotionFile, ReplayGivesTheNumbersOfTheMotion) {
   EXPECT_EQ(frames, expected.size());
 }
 
+// What the clock decided is in the recording: parts, and bands that were put off. Pictures are
+// those of the shown lighting all the same, of a mesh, too, and when nothing is left for the second
+// part.
+TEST(MotionFile, FramesUnderATimeAreReplayedAsTheyWent) {
+  const fixtures::SmallTransport image = fixtures::small_transport(8, 16, 16, 5);
+  const fixtures::SmallTransport mesh =
+      fixtures::small_mesh_transport(8, fixtures::bumpy_sphere(150, 6), 7);
+  const Environment environments[] = {sky(0.5f)};
+  constexpr int kWavelets = 12;
+  for (const fixtures::SmallTransport* small : {&image, &mesh}) {
+    const Transport transport = build_transport(small->info, small->tiles, small->thresholds);
+    MotionRecording recording;
+    recording.environments = {"a.exr"};
+    for (int i = 0; i < 40; ++i) {
+      RecordedFrame frame;
+      frame.light.rotation = rotation_y(0.3 * i);
+      frame.wavelets = kWavelets;
+      if (i == 0) frame.start = FrameStart::exact;
+      frame.course = {true, i % (kWavelets + 1), i % 3 == 1 ? ~0u : i % 3 == 2 ? 0b100u : 0u};
+      recording.frames.push_back(frame);
+    }
+    LightRig rig(transport.layout());
+    rig.set_environment(0, environments[0]);
+    LightingOptions options;
+    options.wavelets = kWavelets;
+    FrameRelighter direct(transport, options, WaveletWeight::area);
+    int resets = 0, put_off = 0, number = 0;
+    relight_recording(
+        transport, environments, parse_motion(motion_text(recording), "m"), false,
+        [&](const SequenceFrame& frame) {
+          const RecordedFrame& recorded = recording.frames[static_cast<std::size_t>(number)];
+          const auto target = rig.coefficients(recorded.light);
+          direct.repeat(recorded.course);
+          const FrameMetrics& metrics = direct.relight(target, recorded.start, number);
+          EXPECT_EQ(frame.picture.pixels, direct.picture().pixels) << number;
+          EXPECT_EQ(frame.metrics.lighting_error, metrics.lighting_error) << number;
+          EXPECT_EQ(frame.metrics.course, recorded.course) << number;
+          EXPECT_EQ(frame.metrics.resets, metrics.resets) << number;
+          if (number > 0) {
+            EXPECT_LE(metrics.updates, kWavelets);
+            EXPECT_TRUE((direct.update().reset & recorded.course.put_off).none()) << number;
+            resets += direct.update().reset.any();
+            put_off += recorded.course.put_off.all();
+          }
+          // Sums in double, pixels in float: a rounding each, and those of a mesh's weights.
+          const Image right =
+              relight_picture_once(transport, direct.tracker().shown(), direct.view().camera);
+          EXPECT_LT(compare_images(frame.picture, right).relative_rmse, 1e-6) << number;
+          ++number;
+          return true;
+        });
+    EXPECT_EQ(number, 40);
+    EXPECT_GT(resets, 3);
+    EXPECT_GT(put_off, 10);
+  }
+}
+
 // From a dark start the budget is all there is: an update holds at most that many wavelets and
 // nothing else is shown.
 TEST(MotionFile, ADarkStartForgetsWhatWasShown) {
@@ -167,9 +230,11 @@ TEST(MotionFile, NamesFrameAndKeyOfWhatIsWrong) {
             "m.json, frame 0, rotation: has 2 entries, expected 9");
   EXPECT_NE(message(R"([{"rotation": [1,0,0, 0,1,0, 0,0,2]}])").find("orthonormal"),
             std::string::npos);
-  for (const char* text : {"[]", "{}", "[3]", R"([{"lights": 3}])", R"([{"wavelets": 0}])",
-                           R"([{"lights": [{"direction": [0, 0, 0]}]}])",
-                           R"([{"wavelets": 1e300}])", R"([{"start": "again"}])"}) {
+  for (const char* text :
+       {"[]", "{}", "[3]", R"([{"lights": 3}])", R"([{"wavelets": 0}])",
+        R"([{"lights": [{"direction": [0, 0, 0]}]}])", R"([{"wavelets": 1e300}])",
+        R"([{"start": "again"}])", R"([{"timed": true}])", R"([{"timed": {"put_off": [99]}}])",
+        R"([{"timed": {"put_off": 1}}])", R"([{"timed": {"last": 1}}])"}) {
     message(text);
   }
   EXPECT_THROW(parse_motion("", "m"), Error);

@@ -91,6 +91,7 @@ struct Case {
   LightingMethod method;
   int wavelets;
   bool expect_resets;
+  bool short_logs = false;
 };
 
 class Invariant : public ::testing::TestWithParam<Case> {};
@@ -108,6 +109,7 @@ TEST_P(Invariant, SumsEqualTransportTimesShown) {
   LightingTracker tracker(layout, options);
   RowSums sums(transport);
   sums.expect_resets(GetParam().expect_resets);
+  sums.keep_logs_short(GetParam().short_logs);
 
   auto target = fixtures::random_lighting(layout, random);
   sums.apply(tracker.start_exact(target));
@@ -139,7 +141,18 @@ TEST_P(Invariant, SumsEqualTransportTimesShown) {
     }
     const LightingUpdate& update = tracker.advance(target);
     updates += static_cast<double>(update.deltas.size()) + layout.size();
-    sums.apply(update);
+    if (frame % 2 == 0) {
+      sums.apply(update);
+    } else {
+      // In two parts: the deltas dealt out, resets with the first.
+      LightingUpdate first, rest;
+      first.reset = update.reset;
+      for (const WaveletDelta& delta : update.deltas) {
+        (random() % 3 ? first : rest).deltas.push_back(delta);
+      }
+      sums.apply(first, {}, UpdatePart::first);
+      sums.apply(rest, {}, UpdatePart::rest);
+    }
     const Product right = multiply(t, tracker.shown());
     const auto found = outputs(sums);
     for (std::size_t i = 0; i < found.size(); ++i) {
@@ -157,6 +170,7 @@ INSTANTIATE_TEST_SUITE_P(Methods, Invariant,
                                            Case{LightingMethod::pbi, 30, true},
                                            Case{LightingMethod::pbi, 100, true},
                                            Case{LightingMethod::pbi, 10, false},
+                                           Case{LightingMethod::pbi, 30, true, true},
                                            Case{LightingMethod::reference, 1, false}));
 
 TEST(RowSums, ASunToggledTenThousandTimesLeavesNothing) {
@@ -248,6 +262,64 @@ TEST(RowSums, AnEmptyUpdateTouchesNothing) {
   EXPECT_EQ(stats.transport_bytes, 0u);
   EXPECT_EQ(stats.sum_bytes, 0u);
   EXPECT_EQ(stats.columns, 0);
+}
+
+// Whoever makes pixels of chunks hears of each that changed, once, when the second part is done.
+TEST(RowSums, OfTwoPartsTheChunksOfBothAreHandedOutAtTheEnd) {
+  const SmallTransport small = fixtures::small_transport(8, 200, 130, 55, 0.05);
+  const Transport transport = build_transport(small.info, small.tiles, small.thresholds);
+  const HaarLayout& layout = transport.layout();
+  std::mt19937_64 random(56);
+  for (int round = 0; round < 20; ++round) {
+    RowSums whole(transport), parts(transport);
+    LightingUpdate all, first, rest;
+    for (int j = layout.size() - 40; j < layout.size(); j += 1 + static_cast<int>(random() % 9)) {
+      all.deltas.push_back({j, {1, 2, 3}});
+      (round == 0 || random() % 2 ? first : rest).deltas.push_back(all.deltas.back());
+    }
+    std::vector<int> expected(static_cast<std::size_t>(transport.chunk_count())), told = expected;
+    whole.apply(all,
+                [&](int chunk, const double*) { ++expected[static_cast<std::size_t>(chunk)]; });
+    const auto tell = [&](int chunk, const double* totals) {
+      ++told[static_cast<std::size_t>(chunk)];
+      const std::size_t at = static_cast<std::size_t>(chunk) * kChunkTotals;
+      EXPECT_EQ(totals, parts.totals().data() + at);
+    };
+    parts.apply(first, tell, UpdatePart::first);
+    EXPECT_EQ(std::count(told.begin(), told.end(), 0), std::ssize(told));
+    parts.apply(rest, tell, UpdatePart::rest);
+    EXPECT_EQ(told, expected);
+    parts.apply({}, tell);
+    EXPECT_EQ(told, expected) << "again";
+    // Two columns of a row are added in another order: one rounding each, of sums below 240.
+    for (std::size_t i = 0; i < whole.totals().size(); ++i) {
+      ASSERT_NEAR(parts.totals()[i], whole.totals()[i], 240 * 80 * 0x1p-53);
+    }
+  }
+}
+
+// Short logs: the dearest reset is a kept picture and one picture's worth of columns, or the update
+// of a frame.
+TEST(RowSums, ShortLogsBoundWhatAResetStreams) {
+  const SmallTransport small = fixtures::small_transport(16, 64, 64, 57, 0.9);
+  const Transport transport = build_transport(small.info, small.tiles, small.thresholds);
+  RowSums sums(transport);
+  const HaarLayout& layout = transport.layout();
+  const int band = layout.band_count() - 1;
+  const auto picture = sums.totals().size_bytes();
+  std::uint64_t longest[2] = {};
+  for (const bool keep_short : {false, true}) {
+    RowSums other(transport);
+    other.keep_logs_short(keep_short);
+    for (int j = layout.band(band).begin; j < layout.band(band).end; ++j) {
+      LightingUpdate update;
+      update.deltas.push_back({j, {1, 1, 1}});
+      other.apply(update);
+      longest[keep_short] = std::max(longest[keep_short], other.reset_bytes(band));
+    }
+  }
+  EXPECT_LE(longest[1], 4 * picture + 2 * transport.column_bytes(layout.band(band).begin));
+  EXPECT_GT(longest[0], longest[1] + picture);
 }
 
 TEST(RowSums, WhatAResetWouldStreamIsKnownBefore) {
