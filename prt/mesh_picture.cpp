@@ -119,6 +119,7 @@ struct MeshPicture::State {
   std::vector<std::uint32_t> band_first_, band_triangles_;
   std::vector<Band> bands_;
   std::vector<float> coverage_;
+  std::vector<double> vertex_sums_;  // scratch of vertex_weights()
   std::mutex mutex_;
   std::vector<std::vector<Sample>> free_samples_;
 };
@@ -434,20 +435,26 @@ std::span<const MeshPicture::Fragment> MeshPicture::fragments(int x, int y) cons
 
 void MeshPicture::vertex_weights(std::vector<float>& weights) const {
   const State& s = *state_;
-  weights.assign(s.mesh_->position.size(), 0.0f);
+  // In double: a vertex of a coarse mesh is seen by many thousand pixels.
+  std::vector<double>& sums = state_->vertex_sums_;
+  sums.assign(s.mesh_->position.size(), 0.0);
   for (int y = 0; y < s.height_; ++y) {
     for (int x = 0; x < s.width_; ++x) {
       const auto pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(s.width_) +
                          static_cast<std::size_t>(x);
-      const float covered = s.coverage_[pixel];
+      const auto covered = static_cast<double>(s.coverage_[pixel]);
       for (const Fragment& f : fragments(x, y)) {
         const auto& corner = s.mesh_->triangle[f.triangle];
-        weights[corner[0]] += covered * (f.share - f.second - f.third);
-        weights[corner[1]] += covered * f.second;
-        weights[corner[2]] += covered * f.third;
+        const auto second = static_cast<double>(f.second), third = static_cast<double>(f.third);
+        sums[corner[0]] += covered * (static_cast<double>(f.share) - second - third);
+        sums[corner[1]] += covered * second;
+        sums[corner[2]] += covered * third;
       }
     }
   }
+  weights.resize(sums.size());
+  std::transform(sums.begin(), sums.end(), weights.begin(),
+                 [](double sum) { return static_cast<float>(sum); });
 }
 
 }  // namespace haarlight

@@ -18,13 +18,16 @@ constexpr std::size_t kMostClasses = 128, kMostGroups = 32;
 // Rounding of a pixel from vertices, see prt/error_estimator.cpp; of a vertex from K terms, a
 // product and sums each.
 constexpr double kPixelRounding = 64 * 0x1p-24, kUnit = 0x1p-24;
+// Of a picture's sum: doubles of one sign or another; shares are floats, of exact sums of floats.
+constexpr double kSumRounding = 1e-9, kShareRounding = 4 * kUnit;
 
 double squared(double x) { return x * x; }
 double channel(const RgbD& c, std::size_t ch) { return ch == 0 ? c.r : ch == 1 ? c.g : c.b; }
 
 }  // namespace
 
-ViewErrorEstimator::ViewErrorEstimator(const Transport& transport) : transport_(transport) {
+ViewErrorEstimator::ViewErrorEstimator(const Transport& transport)
+    : transport_(transport), sum_(transport) {
   const TransportInfo& info = transport.info();
   if (!info.mesh) {
     throw Error(ErrorKind::invalid_argument,
@@ -133,6 +136,9 @@ void ViewErrorEstimator::draw_samples(std::span<const float> share) {
 
 void ViewErrorEstimator::look(const PictureView& view) {
   if (!rows_) draw_samples(view.vertex_weights);
+  share_.assign(view.vertex_weights.begin(), view.vertex_weights.end());
+  factor_.assign(view.factors.begin(), view.factors.end());
+  sum_looked_ = false;
   const auto factor = [&](std::size_t v, std::size_t k) {
     return view.factors.empty() ? RgbD{1, 1, 1} : RgbD(view.factors[v * terms_ + k]);
   };
@@ -264,8 +270,15 @@ PictureErrorGuess ViewErrorEstimator::judge(std::span<const Rgb> target, std::sp
   most = std::sqrt(most) * (1 + 1e-9);
   // Of either picture: sums of terms that may cancel, relative to their sizes.
   const double sums = (static_cast<double>(terms_) + 8) * kUnit * std::sqrt(sizes);
-  const double least =
-      (picture_norm * (1 - kPixelRounding) - most - 2 * sums) * (1 - kPixelRounding);
+  double least = (picture_norm * (1 - kPixelRounding) - most - 2 * sums) * (1 - kPixelRounding);
+  if (least < most) {
+    // A bound above 1 by what is shown: what is not shown has a sum, too.
+    if (!sum_looked_) sum_.look({share_, factor_});
+    sum_looked_ = true;
+    const double by_sum =
+        sum_.least_norm(target) * (1 - kSumRounding) - sums - kShareRounding * std::sqrt(sizes);
+    least = std::max(least, by_sum * (1 - kPixelRounding));
+  }
   if (most == 0 && picture_norm == 0) {
     guess.bound = 0;
   } else if (!(least > 0)) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "prt/error_judge.h"
+#include "prt/picture_sum.h"
 #include "prt/sample_rows.h"
 #include "prt/term_norms.h"
 
@@ -23,10 +24,11 @@ namespace haarlight {
 ///
 /// The bound is the triangle inequality by groups of vertices, channels c and terms,
 ///   sum_gc (sum_k F_gkc sum_j |d_jc| || T_jgkc ||)^2,
-/// F the largest factor times root of the share of the picture, over the norm of what is shown less
-/// that. Clusters: rows are those of vectors, and F_gkc^2 the largest over clusters of the sum over
-/// vertices of share x g^2 x |w|^2 (Cauchy and Schwarz); what is pending adds its own norm. Float
-/// rounding of both pictures is added.
+/// F the largest factor times root of the share of the picture, over the least norm of the exact
+/// picture: the norm of what is shown less that, or what the sum of its pixels says (PictureSum),
+/// so that it is finite unless no light is seen. Clusters: rows are those of vectors, and F_gkc^2
+/// the largest over clusters of the sum over vertices of share x g^2 x |w|^2 (Cauchy and Schwarz);
+/// what is pending adds its own norm. Float rounding of both pictures is added.
 class ViewErrorEstimator final : public ErrorJudge {
  public:
   /// Throws Error{invalid_argument} for a picture.
@@ -58,8 +60,12 @@ class ViewErrorEstimator final : public ErrorJudge {
   std::vector<std::uint32_t> group_;       // of each vertex, or cluster
   std::vector<std::uint32_t> cluster_of_;  // [vertex], of clusters
   std::optional<TermNorms> norms_;
+  PictureSum sum_;
 
-  // Of the view.
+  // Of the view, kept until sum_ is asked for.
+  std::vector<float> share_;
+  std::vector<Rgb> factor_;
+  bool sum_looked_ = false;
   std::vector<Sample> samples_;
   std::optional<SampleRows> rows_;
   std::vector<double> sample_share_;

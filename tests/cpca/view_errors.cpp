@@ -11,6 +11,7 @@
 #include "cpca/compress.h"
 #include "prt/finish_rows.h"
 #include "prt/frame_relighter.h"
+#include "prt/picture_sum.h"
 #include "prt/view_error_estimator.h"
 #include "tests/cpca/inputs.h"
 
@@ -172,10 +173,50 @@ TEST_F(ViewErrors, BoundsHoldInEveryFrameAndEstimatesAreNear) {
     }
     EXPECT_GT(frames, 30);
     EXPECT_GE(near, 0.9 * frames) << "of " << frames;
-    EXPECT_GT(finite, 0);
+    EXPECT_EQ(finite, 2 * std::ssize(light));  // black light is shown at once
     EXPECT_EQ(pending > 10, transport == clusters_);
   }
   set_thread_count(before);
+}
+
+// What the pixels add up to, against pixels that were drawn; and it is no more than their norm,
+// however small the light is beside others.
+TEST_F(ViewErrors, TheSumOfAPictureIsKnownWithoutDrawingIt) {
+  for (const Transport* transport : {terms_, clusters_}) {
+    const std::unique_ptr<Relighter> relighter = make_relighter(any_relighter(), *transport);
+    PictureSum sum(*transport);
+    const auto light = lights(6);
+    for (std::size_t f = 0; f < light.size(); ++f) {
+      const Vec3 sides[] = {{0, 0, 3}, {2.5, -1, 1}, {-1, 0.2, 1.2}};
+      const BoundingSphere sphere = bounding_sphere(*transport->info().mesh);
+      relighter->set_camera(
+          look_at(sphere.center + sphere.radius * sides[f % 3], sphere.center, 0.6, 60, 50));
+      relighter->set_exact(true);
+      LightingUpdate update = full_update(transport->layout(), light[f]);
+      for (int b = 0; b < transport->layout().band_count(); ++b) {
+        update.reset[static_cast<std::size_t>(b)] = true;
+      }
+      relighter->apply(update);
+      std::vector<float> weights;
+      relighter->vertex_weights(weights);
+      sum.look({weights, relighter->view_factors()});
+      RgbD total;
+      double covered = 0, squares = 0;
+      for (std::size_t p = 0; p < relighter->picture().pixels.size(); ++p) {
+        const auto c = static_cast<double>(relighter->coverage()[p]);
+        const RgbD pixel(relighter->picture().pixels[p]);
+        total += c * pixel;
+        squares += pixel.r * pixel.r + pixel.g * pixel.g + pixel.b * pixel.b;
+        covered += c * c;
+      }
+      const double right =
+          std::sqrt((total.r * total.r + total.g * total.g + total.b * total.b) / covered);
+      // Pixels are floats that may cancel: 1e-5 of their norm.
+      EXPECT_NEAR(sum.least_norm(light[f]), right, 1e-5 * std::sqrt(squares)) << f;
+      EXPECT_GT(right, 1e-3 * std::sqrt(squares)) << f;
+      EXPECT_LE(right, std::sqrt(squares)) << f;
+    }
+  }
 }
 
 // The light is right at once, and vertices follow it one vector a frame: all error is what they
