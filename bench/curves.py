@@ -509,6 +509,7 @@ def draw_resets(study, file):
         axis.axvline(STOP, color="0.5", lw=1, ls="--")
     axes[0].set_title("PBI-30: incremental (line) or reset (bar), by area of wavelets", fontsize=9)
     axes[-1].set_xlabel("frame")
+    axes[-1].set_xlim(0, rows.frame[-1])
     figure.savefig(file)
     plt.close(figure)
 
@@ -530,6 +531,7 @@ def draw_strip(study, file, title, columns, frames):
                 axis.set_xticks([])
                 axis.set_yticks([])
                 axis.grid(False)
+                axis.spines[:].set_visible(False)
             error = rows["image_rel_rmse"][frame]
             text = f"{label}, frame {frame}"
             if np.isfinite(error):
@@ -568,7 +570,9 @@ def strips(study, table):
         sh = family.startswith("sh")
         case = Case(*at, best["method"], None if sh else int(best["budget"]), weight=best["weight"])
         if not sh:  # the study of spherical harmonics writes no PNG
-            columns.append((f"{family}-{best['budget']}: {best['ms']:.2f} ms", case))
+            method, _, weight = family.partition(" ")
+            label = f"{method.upper()}-{best['budget']} {weight}".strip()
+            columns.append((f"{label}: {best['ms']:.2f} ms", case))
     draw_strip(study, study.out / "strip_equal_time.png", "Nearly equal time a frame",
                columns + [exact], (75, 104))
 

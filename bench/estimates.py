@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """How near error_estimate is to image_rel_rmse, and whether error_bound holds, as a Markdown table.
 
-  bench/estimates.py OUT_DIR FILE.hlt... --env A.exr --env-to B.exr [--size 256x256] [--bin build/bin]
+  bench/estimates.py OUT_DIR FILE.hlt... --env A.exr --env-to B.exr [--size 256x256] [--orbit DEGREES]
+                     [--motions rotate,blend] [--bin build/bin]
 
 Every file is relit under `rotate` of A and `blend` from A to B, by NWA and PBI at 10, 30 and 100
-wavelets, 50 frames of which the last 15 rest. An estimate is near within a factor of 1.5; errors
+wavelets, 50 frames of which the last 15 rest; with --orbit the camera goes round, too. An estimate is near within a factor of 1.5; errors
 below 1e-6, which are rounding, are left out.
 """
 import argparse
@@ -22,6 +23,8 @@ def sequence(args, transport, motion, method, wavelets, path):
         command += ["--env-to", args.env_to]
     if args.size:
         command += ["--size", args.size]
+    if args.orbit:
+        command += ["--orbit", str(args.orbit)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     with open(path) as f:
         return list(csv.DictReader(f))
@@ -35,6 +38,8 @@ def main():
     parser.add_argument("--env", required=True)
     parser.add_argument("--env-to", required=True)
     parser.add_argument("--size")
+    parser.add_argument("--orbit", type=float)
+    parser.add_argument("--motions", default="rotate,blend")
     parser.add_argument("--bin", default="build/bin")
     args = parser.parse_args()
     os.makedirs(args.out, exist_ok=True)
@@ -43,7 +48,7 @@ def main():
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     for transport in args.files:
         name = os.path.splitext(os.path.basename(transport))[0]
-        for motion in ("rotate", "blend"):
+        for motion in args.motions.split(","):
             ratios, bounds, broken, frames = [], [], 0, 0
             for method in ("nwa", "pbi"):
                 for wavelets in (10, 30, 100):
