@@ -88,8 +88,8 @@ double TimeBudget::to_take_back(const BandMask& reset) const {
 
 BandMask TimeBudget::allow(const BandMask& wanted, std::span<const double> gain) {
   const double left = aim() * wanted_ - elapsed();
-  const double bytes =
-      parts_ ? first_.bytes_within(left - second_.predict(0)) : whole_.bytes_within(left);
+  const double bytes = parts_ ? first_[folds()].bytes_within(left - second_.predict(0))
+                              : whole_[folds()].bytes_within(left);
   if (fixed_bytes_ + to_take_back(wanted) <= bytes) return wanted;
   // The most gain for its bytes first, as long as they fit.
   BandMask allowed, seen;
@@ -118,9 +118,9 @@ void TimeBudget::begin(std::span<const Rgb>, std::span<const Rgb>, const BandMas
   begun_ms_ = elapsed();
   moved_ = fixed_bytes_ + to_take_back(reset);
   const double end = aim() * wanted_;
-  allowed_ = parts_ ? first_.bytes_within(std::min(kFirstPart * wanted_, end - second_.predict(0)) -
-                                          begun_ms_)
-                    : whole_.bytes_within(end - begun_ms_);
+  allowed_ = parts_ ? first_[folds()].bytes_within(
+                          std::min(kFirstPart * wanted_, end - second_.predict(0)) - begun_ms_)
+                    : whole_[folds()].bytes_within(end - begun_ms_);
   if (most_moved_ > 0) allowed_ = std::min(allowed_, 2 * most_moved_);
 }
 
@@ -153,7 +153,7 @@ void TimeBudget::remember(double ratio) {
 
 void TimeBudget::finish(double milliseconds) {
   if (!any_) return;  // nothing was done, and nothing is learnt
-  FrameTimeModel& last = parts_ ? second_ : whole_;
+  FrameTimeModel& last = parts_ ? second_ : whole_[folds()];
   const double before = parts_ ? resumed_ms_ : begun_ms_;
   const bool warm = slower_.size() >= kWarm;
   // Of a frame that was held up, no more than this.
@@ -163,7 +163,7 @@ void TimeBudget::finish(double milliseconds) {
   remember(warm              ? milliseconds / (before + last.predict(moved_))
            : slower_.empty() ? kSlowAtFirst
                              : 1);
-  if (parts_) learn(first_, moved_first_, resumed_ms_ - begun_ms_);
+  if (parts_) learn(first_[folds()], moved_first_, resumed_ms_ - begun_ms_);
   learn(last, moved_, milliseconds - before);
   most_moved_ = std::max(most_moved_, moved_first_ + moved_);
 }

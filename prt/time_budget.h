@@ -68,11 +68,15 @@ class TimeBudget final : public UpdateLimit {
  private:
   double aim() const;
   double elapsed() const;
+  std::size_t folds() const { return fixed_bytes_ > 0 ? 1 : 0; }
   double to_take_back(const BandMask& reset) const;
   void remember(double ratio);
 
   std::vector<double> column_bytes_;
-  FrameTimeModel whole_, first_, second_;  // of frames in one part; of either part
+  // Of frames in one part, and of first parts, without and with fixed bytes: those are streamed,
+  // which is faster a byte than columns are. Of second parts.
+  std::array<FrameTimeModel, 2> whole_, first_;
+  FrameTimeModel second_;
   Clock::time_point (*now_)() = &Clock::now;
   std::array<double, HaarLayout::kMaxBands> reset_bytes_{};
 

@@ -134,6 +134,25 @@ TEST(TimeBudget, InTwoPartsAFrameThatIsHeldUpDoesLess) {
   }
 }
 
+// Frames that fold a log stream much, and faster than columns: others must not be thought as fast.
+TEST(TimeBudget, FramesThatFoldAreLearntApart) {
+  TimeBudget budget(std::vector<double>(100, 1e4));
+  budget.set_clock(made_up_now);
+  const std::array<double, HaarLayout::kMaxBands> none{};
+  const auto frame = [&](double fold) {
+    budget.start(4, g_now, none, fold, false);
+    budget.begin({}, {}, {});
+    int count = 0;
+    while (count < 100000 && budget.take(count % 100, {})) ++count;
+    budget.finish(0.5 + 1e-7 * 1e4 * count + 3e-8 * fold);  // 10 MB a ms, 33 of those folded
+    return count;
+  };
+  for (int i = 0; i < 60; ++i) frame(0);
+  const int before = frame(0);
+  for (int i = 0; i < 60; ++i) frame(i % 2 * 2e7);
+  EXPECT_NEAR(frame(0), before, 0.03 * before);
+}
+
 // Taking back a band may cost more than the whole frame may: then it waits.
 TEST(TimeBudget, ResetsThatDoNotFitArePutOff) {
   // 1.4 ms hold 12 MB, and bands are up to 40 MB.
