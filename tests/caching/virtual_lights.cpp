@@ -6,9 +6,12 @@
 
 #include <cmath>
 
+#include "caching/frame_tracer.h"
 #include "caching/halton.h"
 #include "caching/interleaved_gather.h"
+#include "precompute/bsdf.h"
 #include "tests/caching/edited_scene.h"
+#include "tests/caching/estimate.h"
 #include "tests/precompute/shapes.h"
 
 namespace haarlight {
@@ -85,6 +88,57 @@ TEST(VirtualLights, OneBounceBetweenPlanesIsTheClosedForm) {
   // Halton points: the error falls nearly as 1/N; rotation makes two dimensions one, so that
   // log N / N of 8192 used ones, 0.1 %, with room for its constant.
   EXPECT_NEAR(found, wanted, 0.01 * wanted);
+}
+
+TEST(VirtualLights, SumIsThatOfPaths) {
+  // A room with a block in it, a lamp and walls of albedo a: irradiance in the middle, of light
+  // that has been reflected up to 8 times, which leaves out a share of a^8 at most.
+  Scene scene = shapes::empty_scene();
+  constexpr double kAlbedo = 0.4;
+  scene.material[0].albedo = {0.4f, 0.4f, 0.4f};
+  shapes::add_box(scene, {-1, 0, -1}, {1, 2, 1});
+  shapes::add_box(scene, {-0.7, 0, -0.6}, {-0.2, 0.5, 0.1});
+  AnimatedFrame frame;
+  frame.scene = std::move(scene);
+  frame.emission.resize(1);
+  SceneLight lamp;
+  lamp.position = {0.3, 1.4, 0.2}, lamp.intensity = {2, 2, 2};
+  frame.light.push_back(lamp);
+  const Vec3 place{0.1, 0.9, -0.1}, normal = normalize(Vec3{-1, -0.7, 0.3});
+
+  const FrameTracer tracer(frame);
+  ASSERT_TRUE(tracer.bright().empty());
+  const Vec3 from = tracer.visibility().to_local(place);
+  const Estimate paths = estimate(5, 40000, [&](PathRandom& random) {
+    const double u = random.next(), v = random.next();
+    return kPi * tracer.radiance(from, cosine_direction(normal, u, v), random, false).g;
+  });
+
+  // Scrambled anew, a set of lights is an independent estimate without bias.
+  const MovingVisibility visibility = ready(frame);
+  constexpr double kNear = 0.3;
+  double lost_share = 0;
+  const Estimate lights = estimate(9, 30, [&](PathRandom& random) {
+    const auto seed = static_cast<std::uint64_t>(random.next() * 1e15);
+    double whole = 0, bounded = 0;
+    RgbD lost;
+    for (const VirtualLight& light : virtual_lights(visibility, {512, 8, seed})) {
+      const Vec3 at = visibility.to_local(place);
+      const double all = arrival(light, at, normal, 0).g;
+      if (!(all > 0) || visibility.occluded(segment_to(light, at, normal))) continue;
+      RgbD gone;
+      whole += all, bounded += arrival(light, at, normal, kNear * visibility.scale() * 2, &gone).g;
+      lost += gone;
+    }
+    EXPECT_NEAR(bounded + lost.g, whole, 1e-9 * whole);
+    lost_share += lost.g / whole / 30;
+    return whole;
+  });
+  EXPECT_GT(lost_share, 0.01);  // the bound had something to take
+  // Either way within four standard errors of the difference: one in 16,000 by chance.
+  const double error = std::hypot(paths.error, lights.error);
+  EXPECT_LT(error, 0.02 * paths.mean);
+  EXPECT_NEAR(lights.mean, paths.mean, 4 * error + std::pow(kAlbedo, 8) * paths.mean);
 }
 
 TEST(VirtualLights, BackgroundOverAPlainIsPi) {
