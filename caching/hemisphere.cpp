@@ -63,6 +63,14 @@ Hemisphere stratified_hemisphere(int samples, std::uint64_t key, bool even) {
   return h;
 }
 
+RgbD background_by_strata(const AnimatedFrame& frame, const Hemisphere& h, double cosine,
+                          const Vec3& direction) {
+  if (!frame.environment) return frame.background;
+  const Vec3 in_picture = frame.environment_turn.transposed() * direction;
+  return frame.background + frame.environment->radiance(in_picture) *
+                                share_of_strata(h, cosine, frame.environment->pdf(in_picture));
+}
+
 void gather_hemisphere(const FrameTracer& tracer, const PlaceFrame& at, std::uint64_t key,
                        Hemisphere& h, std::vector<SeenPlace>* seen) {
   const Visibility& visibility = tracer.visibility();
@@ -80,7 +88,9 @@ void gather_hemisphere(const FrameTracer& tracer, const PlaceFrame& at, std::uin
       PathRandom random(mix_bits(~key, i));
       h.radiance[i] = tracer.radiance(hit, from, direction, random, false, &what.by_lamps);
       what.place.triangle = SeenPlace::kBackground;
-      if (hit) {
+      if (!hit) {
+        h.radiance[i] = background_by_strata(tracer.frame(), h, h.direction[i].z, direction);
+      } else {
         h.distance[i] = visibility.to_world_length(hit->distance);
         const auto [a, b, c] = visibility.corners(hit->triangle);
         what.place = {hit->triangle, hit->b1, hit->b2, dot(cross(b - a, c - a), direction) <= 0};
@@ -94,6 +104,26 @@ void gather_hemisphere(const FrameTracer& tracer, const PlaceFrame& at, std::uin
       what.rest = h.radiance[i] - what.by_lamps.radiance;
     }
     if (seen) (*seen)[i] = what;
+  }
+  if (tracer.frame().environment) {
+    const AnimatedFrame& frame = tracer.frame();
+    for (int n = 0; n < kLooks; ++n) {
+      PathRandom random(mix_bits(key ^ 0x50a7, static_cast<std::uint64_t>(n)));
+      const double u = (n + random.next()) / kLooks, v = random.next();
+      const EnvironmentLight::Sample sample = frame.environment->sample(u, v);
+      const Vec3 way = frame.environment_turn * sample.from;
+      const Vec3 d = at.to_local(way);
+      if (!(d.z > 0) || !(dot(way, at.geometric_normal) > 0)) continue;
+      const Vec3 from = FrameTracer::off_surface(place, at.geometric_normal, way);
+      if (visibility.first_hit(from, way)) continue;
+      SeenPlace what;
+      what.place.triangle = SeenPlace::kBackground;
+      what.stratum = h.stratum_of(d), what.in_picture = sample.from;
+      what.by_lamps.radiance =
+          frame.environment->radiance(sample.from) * share_of_strata(h, d.z, sample.pdf);
+      h.radiance[what.stratum] += what.by_lamps.radiance;
+      if (seen) seen->push_back(what);
+    }
   }
   if (tracer.bright().empty()) return;
   for (int n = 0; n < kLooks; ++n) {

@@ -45,18 +45,25 @@ struct SeenPlace {
   BodyPlace place;                  ///< its triangle is kBackground or, below the horizon, kBelow
   FrameTracer::LampShare by_lamps;  ///< of the radiance
   RgbD rest;                        ///< of the radiance
-  /// Of a look: the stratum that it adds its radiance to.
+  // Of a look, which adds its radiance, all of it in by_lamps, to a stratum:
   std::size_t stratum = 0;
+  Vec3 in_picture;  ///< at the background: unit, where in the environment's picture
 };
 
 /// Fills in the light that arrives at `at`, a place in the tracer's frame: what surfaces send after
 /// at least one reflection, all further bounces by paths, and the background. What surfaces shine
 /// by themselves is left out: that is direct light. Directions below the triangle see nothing, at
 /// no distance that counts. Surfaces that lamps make bright are also looked at by themselves, 256
-/// times, weighted against the strata by the balance heuristic (Veach 1997, section 9.2). `seen`,
-/// if wanted, gets one entry a stratum, then one a look that found something.
+/// times, as is a picture behind everything where its light is, both weighted against the strata by
+/// the balance heuristic (Veach 1997, section 9.2). `seen`, if wanted, gets one entry a stratum,
+/// then one a look that found something.
 void gather_hemisphere(const FrameTracer& tracer, const PlaceFrame& at, std::uint64_t key,
                        Hemisphere& hemisphere, std::vector<SeenPlace>* seen);
+
+/// What strata see of the background in a direction (world, unit) of that cosine: a picture behind
+/// it with the weight that looks at it leave.
+RgbD background_by_strata(const AnimatedFrame& frame, const Hemisphere& hemisphere, double cosine,
+                          const Vec3& direction);
 
 /// Irradiance, its rotation gradient, and its translation gradient by how the strata's borders move
 /// (Ward and Heckbert 1992, equations for stratified hemispheres). Requires strata that are not

@@ -182,7 +182,8 @@ Hemisphere reprojected(const Hemisphere& now, const std::vector<SeenPlace>& seen
     if (triangle == SeenPlace::kBelow) continue;  // the body's own ground turns with it
     if (triangle == SeenPlace::kBackground) {
       // What lies that way then: body and picture may have turned.
-      radiance = change.next().background_from(normalize(at.to_world(now.direction[i])));
+      radiance = background_by_strata(change.next(), now, now.direction[i].z,
+                                      normalize(at.to_world(now.direction[i])));
     } else {
       const bool moves = change.moves(triangle);
       const bool relit = moves || change.lights_change() || change.recolors(triangle);
@@ -222,9 +223,21 @@ Hemisphere reprojected(const Hemisphere& now, const std::vector<SeenPlace>& seen
     for (std::size_t i = size; i < seen.size(); ++i) {
       const SeenPlace& look = seen[i];
       const std::uint32_t triangle = look.place.triangle;
-      const bool moves = change.moves(triangle);
+      const bool moves = triangle != SeenPlace::kBackground && change.moves(triangle);
       RgbD radiance = look.by_lamps.radiance;
       std::size_t stratum = look.stratum;
+      if (triangle == SeenPlace::kBackground) {
+        const Vec3 way = change.next().environment_turn * look.in_picture;
+        const Vec3 d = at.to_local(way);
+        if (itself || !(way == change.now().environment_turn * look.in_picture)) {
+          ++counts.moved;
+          if (!(d.z > 0)) continue;
+          stratum = now.stratum_of(d);
+          radiance = background_by_strata(change.next(), now, d.z, way) - change.next().background;
+        }
+        next.radiance[stratum] += radiance;
+        continue;
+      }
       if (itself || moves || change.lights_change() || change.recolors(triangle)) {
         const PlaceFrame here = place_in(change.now().scene, look.place);
         const PlaceFrame there = place_in(change.next().scene, look.place);
