@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Instant caching and temporal instant caching against instant global illumination, as ratios.
 
-  bench/instant_caching.py OUT_DIR [--bin build/bin] [--scenes cube-in-box moving-light spheres]
+  bench/instant_caching.py OUT_DIR [--bin build/bin] [--scenes cornell-bunny bunnies-9 ...]
                            [--frames 20] [--size 600x400] [--look 300x200] [--paths 256]
 
 For each scene one run each of direct light alone, igi, ic and tic at --size. first.csv: milliseconds of
@@ -23,13 +23,18 @@ from caching import Failure, markdown, read_exr, rows_of, run, write
 from perceptual import difference
 
 METHODS = ["direct", "igi", "ic", "tic"]
+# Of the papers; bunnies-N: N of nine bounce.
+SCENES = ["cornell-bunny", "wobble", "desk", "bunnies-1", "bunnies-2", "bunnies-4", "bunnies-9", "office", "spheres",
+          "cube-in-box"]
 
 
 def animate(options, scene, method, name, *arguments):
     """Folder of frames and rows of metrics; made if it is not there."""
     file, folder = options.out / f"{scene}.glb", options.out / f"{scene}-{name}"
     if not file.exists():
-        run(options.bin / "haarlight-data", "animation", scene, "-o", file)
+        name_of, _, count = scene.partition("bunnies-")
+        what = ["bunnies", "--count", count] if count else [name_of]
+        run(options.bin / "haarlight-data", "animation", *what, "-o", file)
     if not (folder / "metrics.csv").exists():
         run(options.bin / "haarlight", "animate", file, "--method", method, "-o", folder, "--metrics",
             folder / "metrics.csv", *arguments)
@@ -90,7 +95,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("out", type=Path)
     parser.add_argument("--bin", type=Path, default=Path("build/bin"))
-    parser.add_argument("--scenes", nargs="+", default=["cube-in-box", "moving-light", "spheres"])
+    parser.add_argument("--scenes", nargs="+", default=SCENES)
     parser.add_argument("--frames", type=int, default=20)
     parser.add_argument("--size", default="600x400")
     parser.add_argument("--look", default="300x200")

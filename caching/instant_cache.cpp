@@ -139,6 +139,12 @@ bool InstantCache::go_on(const MovingVisibility& scene, std::size_t number, Coun
     std::fill_n(stale, words_, ~std::uint64_t{0});
     return false;
   }
+  if (!scene.any_moved() && !any_changed_) {
+    for (std::size_t k = 0; k < lights_.size(); ++k) {
+      counts.saved += light[k] != kUnlit && !(stale[k / 64] >> k % 64 & 1u);
+    }
+    return false;
+  }
   bool any = false;
   for (std::size_t k = 0; k < lights_.size(); ++k) {
     const std::uint64_t bit = std::uint64_t{1} << k % 64;

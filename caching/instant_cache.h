@@ -55,6 +55,11 @@ class InstantCache {
   void start_anew(const MovingVisibility& scene, std::vector<VirtualLight> lights,
                   InstantCacheReport& report);
 
+  /// Whether nothing that records hold has changed in the current frame of `scene` under `lights`.
+  bool is_of(const MovingVisibility& scene, const std::vector<VirtualLight>& lights) const {
+    return !scene.anew() && !scene.any_moved() && lights == lights_;
+  }
+
   /// Irradiance of each point by interpolation, equation 4, in the order of `rows`; makes records
   /// where points have none near and brings those up to date that they use. An order of the points
   /// themselves decides where records come to lie: coarse grid first.

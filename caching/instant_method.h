@@ -40,6 +40,8 @@ class InstantMethod : public AnimationMethod {
 
   std::vector<std::string> figures() const override;
   FramePicture frame(int number, const Progress& progress) override;
+  /// A frame of the scene as it stands, whatever was drawn before: nothing need be known of it.
+  FramePicture draw(AnimatedFrame frame, const Progress& progress);
 
  private:
   const AnimatedScene& scene_;

@@ -130,7 +130,12 @@ void add_options(CLI::App& app, CommandLine& c) {
   // A scene that moves.
   add_words<SceneMethod>(
       app, "--renderer", c.scene.settings.method,
-      {{"path", SceneMethod::path}, {"irc", SceneMethod::irc}, {"trc", SceneMethod::trc}},
+      {{"path", SceneMethod::path},
+       {"irc", SceneMethod::irc},
+       {"trc", SceneMethod::trc},
+       {"igi", SceneMethod::igi},
+       {"ic", SceneMethod::ic},
+       {"tic", SceneMethod::tic}},
       "of a scene that moves: path tracing, irradiance caching or temporal radiance caching "
       "[path]");
   app.add_option("--spp", c.scene.settings.samples, "path: paths a pixel in one picture [1]")

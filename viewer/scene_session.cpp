@@ -34,7 +34,7 @@ void SceneSession::step(int frames) {
 void SceneSession::set_method(SceneMethod method) {
   changed_ = changed_ || method != settings_.method;
   settings_.method = method;
-  method_.reset();
+  method_.reset(), instant_.reset();
 }
 
 void SceneSession::orbit(double turn, double rise, double closer) {
@@ -43,15 +43,19 @@ void SceneSession::orbit(double turn, double rise, double closer) {
   changed_ = touched_ = true;
 }
 
+const FrameTracer& SceneSession::tracer() const {
+  if (!tracer_) tracer_ = std::make_unique<FrameTracer>(*now_);
+  return *tracer_;
+}
+
 // The frame, and from where it is seen.
 void SceneSession::look() {
   tracer_.reset();
   scene_.set_camera({});
   now_ = std::make_unique<AnimatedFrame>(scene_.at(frame_));
   camera_ = frame_camera(*now_, settings_.width, settings_.height);
-  tracer_ = std::make_unique<FrameTracer>(*now_);
-  const Visibility& visibility = tracer_->visibility();
   if (!middle_) {
+    const Visibility& visibility = tracer().visibility();
     const Vec3 way = camera_.direction(0.5 * camera_.width, 0.5 * camera_.height);
     const auto hit = visibility.first_hit(visibility.to_local(camera_.position), way);
     middle_ = camera_.position + way * (hit ? visibility.to_world_length(hit->distance) : 2.0);
@@ -88,7 +92,7 @@ std::optional<SceneSession::Grab> SceneSession::grab(double x, double y) const {
     if (std::hypot((*pixel)[0] - x, (*pixel)[1] - y) > kNear) continue;
     return Grab{lamps[n], true, light.position, scene_.carried(lamps[n])};
   }
-  const Visibility& visibility = tracer_->visibility();
+  const Visibility& visibility = tracer().visibility();
   const Vec3 way = camera_.direction(x, y);
   const auto hit = visibility.first_hit(visibility.to_local(camera_.position), way);
   if (!hit) return std::nullopt;
@@ -123,6 +127,23 @@ void SceneSession::drag(const Grab& grab, double x, double y) {
   changed_ = touched_ = true;
 }
 
+// Adds to what there is.
+void SceneSession::draw_paths() {
+  if (changed_) samples_ = 0, sum_.clear();
+  PathPictureOptions options;
+  options.width = settings_.width, options.height = settings_.height;
+  options.samples = settings_.samples;
+  options.seed = static_cast<std::uint64_t>(samples_) + 1;
+  const Image more = path_picture(tracer(), options);
+  sum_.resize(more.pixels.size());
+  samples_ += settings_.samples;
+  if (picture_.width != more.width || picture_.height != more.height) picture_ = more;
+  for (std::size_t i = 0; i < sum_.size(); ++i) {
+    sum_[i] += RgbD(more.pixels[i]) * static_cast<double>(settings_.samples);
+    picture_.pixels[i] = Rgb(sum_[i] * (1.0 / samples_));
+  }
+}
+
 bool SceneSession::advance() {
   if (playing_ && begun_) {
     frame_ = (frame_ + 1) % frames_;
@@ -132,19 +153,18 @@ bool SceneSession::advance() {
   if (!changed_ && !better) return false;
   if (changed_) look();
   if (settings_.method == SceneMethod::path) {
-    if (changed_) samples_ = 0, sum_.clear();
-    PathPictureOptions options;
-    options.width = settings_.width, options.height = settings_.height;
-    options.samples = settings_.samples;
-    options.seed = static_cast<std::uint64_t>(samples_) + 1;
-    const Image more = path_picture(*tracer_, options);
-    sum_.resize(more.pixels.size());
-    samples_ += settings_.samples;
-    if (picture_.width != more.width || picture_.height != more.height) picture_ = more;
-    for (std::size_t i = 0; i < sum_.size(); ++i) {
-      sum_[i] += RgbD(more.pixels[i]) * static_cast<double>(settings_.samples);
-      picture_.pixels[i] = Rgb(sum_[i] * (1.0 / samples_));
+    draw_paths();
+  } else if (is_instant()) {
+    if (!instant_) {
+      InstantOptions options;
+      options.width = settings_.width, options.height = settings_.height;
+      options.kind = settings_.method == SceneMethod::igi  ? InstantKind::igi
+                     : settings_.method == SceneMethod::ic ? InstantKind::ic
+                                                           : InstantKind::tic;
+      instant_ = std::make_unique<InstantMethod>(scene_, options);
     }
+    picture_ = instant_->draw(*now_, {}).radiance;
+    samples_ = 0;
   } else {
     // A cache goes on from frame to frame; what a hand has done it could not foresee.
     if (!method_ || touched_ || frame_ != drawn_ + 1) {

@@ -12,13 +12,15 @@
 #include "caching/animated_scene.h"
 #include "caching/animation_method.h"
 #include "caching/frame_tracer.h"
+#include "caching/instant_method.h"
 #include "core/image.h"
 #include "viewer/settings.h"
 
 namespace haarlight::viewer {
 
 /// How frames are drawn; see docs/caching.md.
-enum class SceneMethod { path, irc, trc };
+enum class SceneMethod { path, irc, trc, igi, ic, tic };
+inline constexpr int kSceneMethods = 6;
 
 struct SceneSettings {
   int width = 600, height = 400;  ///< pixels
@@ -29,7 +31,8 @@ struct SceneSettings {
 };
 
 /// Plays an animated scene. What is still is drawn better and better by `path`, and once by the
-/// others. Not for two threads at once.
+/// others; by virtual lights each frame as it stands, so that a hand may move anything. Not for two
+/// threads at once.
 class SceneSession {
  public:
   /// Throws as AnimatedScene and load_environment(), and Error{missing} without a camera.
@@ -76,6 +79,9 @@ class SceneSession {
 
  private:
   void look();
+  void draw_paths();
+  bool is_instant() const { return settings_.method >= SceneMethod::igi; }
+  const FrameTracer& tracer() const;
   std::optional<std::array<double, 2>> pixel_of(const Vec3& world) const;
 
   AnimatedScene scene_;
@@ -87,8 +93,9 @@ class SceneSession {
   std::optional<Vec3> middle_;  // what the camera turns about
   Camera camera_;
   std::unique_ptr<AnimatedFrame> now_;
-  std::unique_ptr<FrameTracer> tracer_;  // of now_
+  mutable std::unique_ptr<FrameTracer> tracer_;  // of now_, once somebody asks
   std::unique_ptr<AnimationMethod> method_;
+  std::unique_ptr<InstantMethod> instant_;
   int drawn_ = -1;        // the last frame that method_ drew
   bool touched_ = false;  // since then something moved that no key says
   Image picture_;

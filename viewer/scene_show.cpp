@@ -7,7 +7,9 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <utility>
@@ -21,23 +23,56 @@
 namespace haarlight::viewer {
 namespace {
 
-constexpr const char* kMethods[] = {"path tracing", "irradiance caching",
-                                    "temporal radiance caching"};
+constexpr const char* kMethods[kSceneMethods] = {"path tracing",
+                                                 "irradiance caching",
+                                                 "temporal radiance caching",
+                                                 "instant global illumination",
+                                                 "instant caching",
+                                                 "temporal instant caching"};
+
+// What a display shows of a share of its light, in steps finer than its own.
+class DisplayCode {
+ public:
+  DisplayCode() {
+    for (std::size_t i = 0; i < code_.size(); ++i) {
+      const double v = static_cast<double>(i) / kMost;
+      const double coded = v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055;
+      code_[i] = static_cast<std::uint8_t>(std::lround(255 * coded));
+    }
+  }
+  std::uint8_t operator()(float x) const {
+    return code_[static_cast<std::size_t>(std::clamp(x, 0.0f, 1.0f) * kMost + 0.5f)];
+  }
+
+ private:
+  static constexpr std::uint16_t kMost = 65535;
+  std::array<std::uint8_t, kMost + 1> code_{};
+};
 
 std::vector<std::uint8_t> bytes_of(const Image& radiance, TonemapCurve curve, double exposure) {
+  static const DisplayCode code;
   const Image shown = tonemap(radiance, {curve, exposure});
-  std::vector<std::uint8_t> bytes;
-  bytes.reserve(4 * shown.pixels.size());
-  for (const Rgb& c : shown.pixels) {
-    for (const float x : {c.r, c.g, c.b}) {
-      const double v = std::clamp(static_cast<double>(x), 0.0, 1.0);
-      const double coded = v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055;
-      bytes.push_back(static_cast<std::uint8_t>(std::lround(255 * coded)));
-    }
-    bytes.push_back(255);
+  std::vector<std::uint8_t> bytes(4 * shown.pixels.size(), 255);
+  for (std::size_t i = 0; i < shown.pixels.size(); ++i) {
+    const Rgb& c = shown.pixels[i];
+    bytes[4 * i] = code(c.r), bytes[4 * i + 1] = code(c.g), bytes[4 * i + 2] = code(c.b);
   }
   return bytes;
 }
+
+// How many pictures a second there were lately.
+class PictureRate {
+ public:
+  // One more, so many seconds after the one before.
+  void add(double seconds) {
+    constexpr double kNew = 0.2;
+    mean_ = mean_ > 0 ? (1 - kNew) * mean_ + kNew * seconds : seconds;
+  }
+  double a_second() const { return mean_ > 0 ? 1 / mean_ : 0; }
+
+ private:
+  double mean_ = 0;
+};
 
 // Where the picture lies in the window, and which of its pixels is at a place there.
 struct Place {
@@ -72,7 +107,7 @@ class SceneInterface {
       if (ImGui::IsKeyPressed(GLFW_KEY_COMMA)) session_.step(-1);
       if (ImGui::IsKeyPressed(GLFW_KEY_M, false)) {
         session_.set_method(
-            static_cast<SceneMethod>((static_cast<int>(session_.method()) + 1) % 3));
+            static_cast<SceneMethod>((static_cast<int>(session_.method()) + 1) % kSceneMethods));
       }
       for (const auto& [key, change] : {std::pair{GLFW_KEY_EQUAL, 0.25}, {GLFW_KEY_MINUS, -0.25}}) {
         if (!ImGui::IsKeyPressed(key)) continue;
@@ -97,7 +132,7 @@ class SceneInterface {
     return reshow;
   }
 
-  void draw(const Place& place, const Texture& texture) {
+  void draw(const Place& place, const Texture& texture, double pictures_a_second) {
     ImDrawList& under = *ImGui::GetBackgroundDrawList();
     const ImVec2 end(place.corner.x + place.size.x, place.corner.y + place.size.y);
     under.AddImage(reinterpret_cast<ImTextureID>(static_cast<std::intptr_t>(texture.id())),
@@ -115,7 +150,7 @@ class SceneInterface {
     ImGui::SameLine();
     if (ImGui::Button("Step")) session_.step(1);
     int method = static_cast<int>(session_.method());
-    if (ImGui::Combo("##method", &method, kMethods, 3)) {
+    if (ImGui::Combo("##method", &method, kMethods, kSceneMethods)) {
       session_.set_method(static_cast<SceneMethod>(method));
     }
     int frame = session_.frame();
@@ -127,6 +162,7 @@ class SceneInterface {
                                                session_.triangles(), session_.samples())
                                  : fmt::format("{} triangles", session_.triangles());
     ImGui::TextUnformatted(line.c_str());
+    ImGui::TextUnformatted(fmt::format("{:.1f} pictures a second", pictures_a_second).c_str());
     ImGui::TextDisabled("drag: turn; right drag: move body or lamp; wheel: closer");
     ImGui::End();
   }
@@ -149,6 +185,9 @@ void show_scene(const SceneRunOptions& options, int width, int height, double sc
   session.play(options.frames > 0);
   bool reshow = true;
   int pictures = 1;
+  PictureRate rate;
+  double last_picture = glfwGetTime();
+  bool rested = false;  // since the last picture
   while (!glfwWindowShouldClose(window.handle())) {
     glfwPollEvents();
     int pixels_wide = 0, pixels_high = 0;
@@ -165,7 +204,7 @@ void show_scene(const SceneRunOptions& options, int width, int height, double sc
     window.begin_frame({});
     const Place place = place_of(session.picture());
     reshow = interface.take_input(place);
-    interface.draw(place, texture);
+    interface.draw(place, texture, rate.a_second());
     glViewport(0, 0, pixels_wide, pixels_high);
     glClearColor(0.055f, 0.058f, 0.063f, 1);
     glClear(GL_COLOR_BUFFER_BIT);
@@ -179,9 +218,13 @@ void show_scene(const SceneRunOptions& options, int width, int height, double sc
     if (session.frame() == options.pause_at) session.play(false);
     if (session.advance()) {
       reshow = true, ++pictures;
+      const double now = glfwGetTime();
+      if (!rested) rate.add(now - last_picture);
+      last_picture = now, rested = false;
     } else if (options.frames > 0) {
       ++pictures;  // it is as good as it gets
     } else {
+      rested = true;
       glfwWaitEventsTimeout(0.1);
     }
   }

@@ -157,6 +157,37 @@ TEST(SceneSession, CachesDrawTheSameSceneAndThenRest) {
   }
 }
 
+TEST(SceneSession, VirtualLightsDrawTheSameSceneAndGoOnUnderAHand) {
+  const auto file = scene_file("moving-light");
+  SceneSettings settings{60, 45, SceneMethod::path, 256, 0, {}};
+  SceneSession truth(file, settings);
+  truth.advance();
+  settings.method = SceneMethod::ic, settings.samples = 1;
+  const auto move = [](SceneSession& session, double x) {
+    const auto lamps = session.lamps_seen();
+    const auto lamp = session.grab(lamps[0][0], lamps[0][1]);
+    ASSERT_TRUE(lamp && lamp->lamp);
+    session.drag(*lamp, lamps[0][0] + x, lamps[0][1]);
+  };
+  for (const SceneMethod method : {SceneMethod::igi, SceneMethod::ic, SceneMethod::tic}) {
+    settings.method = method;
+    SceneSession session(file, settings);
+    EXPECT_TRUE(session.advance());
+    // As above; and the bound of the nearest lights, and few reflections.
+    EXPECT_LT(difference(session.picture(), truth.picture()), 0.2);
+    EXPECT_FALSE(session.advance());
+    move(session, -15);
+    EXPECT_TRUE(session.advance());
+    EXPECT_FALSE(session.advance());
+    // One that sees the lamp there for the first time: the same lights, and records elsewhere.
+    SceneSession other(file, settings);
+    move(other, -15);
+    other.advance();
+    EXPECT_LT(difference(session.picture(), other.picture()), 0.02);
+    EXPECT_GT(difference(session.picture(), truth.picture()), 0.05);
+  }
+}
+
 TEST(SceneSession, RunsWithoutAWindow) {
   SceneRunOptions options;
   options.scene = scene_file("moving-light");

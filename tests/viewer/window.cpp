@@ -310,5 +310,34 @@ TEST_F(ViewWindow, PlaysASceneThatMoves) {
   }
 }
 
+TEST_F(ViewWindow, PlaysASceneThatMovesByVirtualLights) {
+  data_gen::save_animation(folder_ / "box.glb", "cube-in-box");
+  const std::vector<std::string> common = {"box.glb", "--frames", "6", "--picture", "96x72"};
+  std::vector<std::string> with = {"-a", "-s", "-screen 0 1600x1200x24", HAARLIGHT_VIEW};
+  with.insert(with.end(), common.begin(), common.end());
+  for (const char* word :
+       {"--renderer", "tic", "--size", "480x360", "--exr", "tic.exr", "--screenshot", "tic.png"}) {
+    with.emplace_back(word);
+  }
+  const ProgramResult result = run_with_display(with, folder_.path());
+  ASSERT_EQ(result.code, 0) << result.err;
+  std::vector<std::string> without = {"-a", HAARLIGHT_VIEW};
+  without.insert(without.end(), common.begin(), common.end());
+  for (const char* word : {"--headless", "--renderer", "igi", "--exr", "igi.exr"}) {
+    without.emplace_back(word);
+  }
+  const ProgramResult other = run_with_display(without, folder_.path());
+  ASSERT_EQ(other.code, 0) << other.err;
+  // Frame 5, by the same lights: the pictures differ by how they are asked, and edges alone.
+  const auto all = [&](const char* file) { return boxes(load_image(folder_ / file), 8, 6); };
+  EXPECT_GT(correlation(all("igi.exr"), all("tic.exr")), 0.98);
+  // The window shows the picture, where the panel, top left, does not cover it.
+  const std::vector<double> shown = all("tic.png"), sent = all("tic.exr");
+  const auto below = [](const std::vector<double>& v) {
+    return std::vector<double>(v.begin() + 3 * 8 * 4, v.end());
+  };
+  EXPECT_GT(correlation(below(shown), below(sent)), 0.9);
+}
+
 }  // namespace
 }  // namespace haarlight::fixtures
