@@ -15,6 +15,7 @@ import json
 import math
 import sys
 
+UNIT = {"ns": 1e-6, "us": 1e-3, "ms": 1, "s": 1e3}
 SIGMAS = 3
 MEDIAN_SPREAD = math.sqrt(math.pi / 2)  # of the median of normal numbers, over that of their mean
 
@@ -23,21 +24,24 @@ class Failure(Exception):
     """A message for the user, one line."""
 
 
-def read(path):
-    """Case -> {median, deviation, repetitions}, in milliseconds."""
+def benchmarks(path):
+    """What haarlight-bench wrote, case by case and repetition by repetition."""
     try:
         with open(path) as f:
-            runs = json.load(f)["benchmarks"]
+            return json.load(f)["benchmarks"]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise Failure(f"{path}: no JSON of Google Benchmark ({error})") from error
-    unit = {"ns": 1e-6, "us": 1e-3, "ms": 1, "s": 1e3}
+
+
+def read(path):
+    """Case -> {median, deviation, repetitions}, in milliseconds."""
     cases = {}
-    for run in runs:
+    for run in benchmarks(path):
         kind = run.get("aggregate_name")
         if kind not in ("median", "stddev") or run.get("error_occurred"):
             continue
         case = cases.setdefault(run["run_name"], {"repetitions": run.get("repetitions", 1)})
-        case[kind] = run["real_time"] * unit[run.get("time_unit", "ns")]
+        case[kind] = run["real_time"] * UNIT[run.get("time_unit", "ns")]
     whole = {name: case for name, case in cases.items() if "median" in case and "stddev" in case}
     if not whole:
         raise Failure(f"{path}: no medians with their spread, expected runs of several repetitions")

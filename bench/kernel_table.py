@@ -8,26 +8,16 @@ case memory.read among its cases. Spread is the standard deviation of the repeti
 mean.
 """
 import argparse
-import json
 import re
 import sys
 
-UNIT = {"ns": 1e-6, "us": 1e-3, "ms": 1, "s": 1e3}
-
-
-class Failure(Exception):
-    """A message for the user, one line."""
+from compare import UNIT, Failure, benchmarks
 
 
 def read(path):
     """Case -> {median, mean, stddev: of ms; bytes: a second, at the median; repetitions}."""
-    try:
-        with open(path) as f:
-            runs = json.load(f)["benchmarks"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise Failure(f"{path}: no JSON of Google Benchmark ({error})") from error
     cases = {}
-    for run in runs:
+    for run in benchmarks(path):
         if run.get("error_occurred"):
             raise Failure(f"{path}: {run['run_name']} says {run.get('error_message')}")
         kind = run.get("aggregate_name")
