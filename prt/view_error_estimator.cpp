@@ -24,6 +24,31 @@ constexpr double kSumRounding = 1e-9, kShareRounding = 4 * kUnit;
 double squared(double x) { return x * x; }
 double channel(const RgbD& c, std::size_t ch) { return ch == 0 ? c.r : ch == 1 ? c.g : c.b; }
 
+// Adds to chances so that they are in proportion to sizes, at most 1, and `wanted` in all: what is
+// larger than its part is certain, and others share what is left.
+void add_chances(std::span<const std::uint32_t> vertices, std::span<const float> size,
+                 double wanted, std::vector<double>& chance) {
+  std::vector<float> sorted;
+  for (const std::uint32_t v : vertices) {
+    if (size[v] > 0) sorted.push_back(size[v]);
+  }
+  std::sort(sorted.begin(), sorted.end());
+  double rest = 0;
+  for (const float s : sorted) rest += static_cast<double>(s);
+  double left = std::min(wanted, static_cast<double>(sorted.size()));
+  while (!sorted.empty() && static_cast<double>(sorted.back()) * left > rest) {
+    rest -= static_cast<double>(sorted.back());
+    left -= 1;
+    sorted.pop_back();
+  }
+  const double most = sorted.empty() ? 0 : static_cast<double>(sorted.back());
+  const double a_unit = rest > 0 ? left / rest : 0;
+  for (const std::uint32_t v : vertices) {
+    const auto own = static_cast<double>(size[v]);
+    if (own > 0) chance[v] += own > most ? 1 : std::min(1.0, own * a_unit);
+  }
+}
+
 }  // namespace
 
 ViewErrorEstimator::ViewErrorEstimator(const Transport& transport)
@@ -83,25 +108,23 @@ ViewErrorEstimator::~ViewErrorEstimator() = default;
 
 // Systematic: along the order, so that the samples are spread over the surface.
 void ViewErrorEstimator::draw_samples(std::span<const float> share) {
-  double shares = 0, areas = 0;
-  for (const std::uint32_t v : order_) {
-    shares += static_cast<double>(share[v]);
-    areas += static_cast<double>(area_[v]);
-  }
-  const std::size_t wanted =
-      std::min(vertices_, std::clamp(kMostSums / terms_, kLeastSamples, kMostSamples));
-  const double halves = (shares > 0 ? 0.5 : 0) + (areas > 0 ? 0.5 : 0);
+  const auto wanted = static_cast<double>(
+      std::min(order_.size(), std::clamp(kMostSums / terms_, kLeastSamples, kMostSamples)));
+  std::vector<double> chance(vertices_, 0.0);
+  add_chances(order_, share, 0.5 * wanted, chance);
+  add_chances(order_, area_, 0.5 * wanted, chance);
   double reached = 0.5;  // of the places drawn at, one apart
   std::vector<RowSum> sums;
   for (const std::uint32_t v : order_) {
-    double chance = shares > 0 ? 0.5 * static_cast<double>(share[v]) / shares : 0;
-    chance += areas > 0 ? 0.5 * static_cast<double>(area_[v]) / areas : 0;
-    const double expected = static_cast<double>(wanted) * chance / halves;
+    const double expected = std::min(chance[v], 1.0);
+    if (expected >= 1) {
+      samples_.push_back({v, 1.0});
+      continue;
+    }
     reached += expected;
-    const double drawn = std::floor(reached);
-    reached -= drawn;
-    if (drawn < 1) continue;
-    samples_.push_back({v, drawn / expected});
+    if (reached < 1) continue;
+    reached -= 1;
+    samples_.push_back({v, 1 / expected});
   }
   const TransportInfo& info = transport_.info();
   std::vector<std::uint32_t> place_of(info.clusters ? vertices_ : 0);

@@ -16,8 +16,9 @@ namespace haarlight {
 
 /// What a row is worth changes with the view, so that no sketch of rows, made once, serves: terms
 /// are added up after it. Instead a few hundred vertices are drawn at random, in proportion to what
-/// the first picture shows of them and to their surface, half each, and their rows (of clusters,
-/// those put together by their weights) are kept. A frame's estimate is the finished error of these
+/// the first picture shows of them and to their surface, half each (what is so large that it would
+/// be drawn more than once is taken once, for certain), and their rows (of clusters, those put
+/// together by their weights) are kept. A frame's estimate is the finished error of these
 /// vertices, sum over k of g_k(w_o) (T d)_k, by what the picture shows of each over the chance to
 /// be drawn (Horvitz and Thompson 1952), over the same sum of what they show exactly, which is off
 /// alike. What vertices of clusters have yet to follow is in it.

@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "prt/tile_codec.h"
@@ -18,12 +19,12 @@
 
 namespace haarlight::fixtures {
 
-/// What vertices of a bumpy sphere show without shadows: term k of a vertex of normal n has texels
+/// What vertices show without shadows: term k of a vertex of normal n has texels
 /// max(0, n . w)^(1 + 3 k) dw. Vertices with `tints` have colours of their own; those below y =
 /// `black_below` (of the unit normal) have no transport.
-inline SmallTransport smooth_transport(int face, int vertices, int terms, bool tints,
+inline SmallTransport smooth_transport(int face, TransportMesh mesh, int terms, bool tints,
                                        double black_below = -2) {
-  SmallTransport out = small_mesh_transport(face, bumpy_sphere(vertices, 5), 5, terms);
+  SmallTransport out = small_mesh_transport(face, std::move(mesh), 5, terms);
   const HaarLayout layout(face);
   const auto size = static_cast<std::size_t>(layout.size());
   const auto order = row_order(out.info);
@@ -67,6 +68,12 @@ inline SmallTransport smooth_transport(int face, int vertices, int terms, bool t
     }
   }
   return out;
+}
+
+/// The same of a bumpy sphere.
+inline SmallTransport smooth_transport(int face, int vertices, int terms, bool tints,
+                                       double black_below = -2) {
+  return smooth_transport(face, bumpy_sphere(vertices, 5), terms, tints, black_below);
 }
 
 /// A transport's rows, dense, colours applied: [output][channel][coefficient].

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "core/parallel.h"
@@ -26,9 +27,10 @@ class ViewErrors : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new TemporaryFolder;
-    SmallTransport small = fixtures::smooth_transport(kFace, 600, kTerms, true, -0.9);
+    // Vertices so near each other that a pixel, a mean of some, errs nearly as they do.
+    SmallTransport small = fixtures::smooth_transport(kFace, 1500, kTerms, true, -0.9);
     const SmallTransport colored =
-        fixtures::small_mesh_transport(kFace, fixtures::bumpy_sphere(600, 5), 5, kTerms);
+        fixtures::small_mesh_transport(kFace, fixtures::bumpy_sphere(1500, 5), 5, kTerms);
     for (std::size_t t = 0; t < small.tiles.size(); t += 9) small.tiles[t] = colored.tiles[t];
     // One material a half: vertices of a pixel are of one.
     ViewFactors factors =
@@ -177,6 +179,51 @@ TEST_F(ViewErrors, BoundsHoldInEveryFrameAndEstimatesAreNear) {
     EXPECT_EQ(pending > 10, transport == clusters_);
   }
   set_thread_count(before);
+}
+
+// A ground of four vertices fills half of the picture and has nearly all of the area. It may take
+// four of the samples, so that the rest tells of the body on it, from behind as well.
+TEST(ViewErrorSamples, LargeSurfacesOfFewVerticesLeaveOthersTheirs) {
+  TransportMesh mesh = fixtures::bumpy_sphere(2500, 5);
+  const auto first = static_cast<std::uint32_t>(mesh.position.size());
+  for (const auto& [x, z] : {std::pair{-9.0f, -9.0f}, {-9.0f, 9.0f}, {9.0f, 9.0f}, {9.0f, -9.0f}}) {
+    mesh.position.push_back({x, -1.2f, z});
+    mesh.normal.push_back({0, 1, 0});
+  }
+  mesh.triangle.push_back({first, first + 1, first + 2});
+  mesh.triangle.push_back({first, first + 2, first + 3});
+  SmallTransport small = fixtures::smooth_transport(kFace, mesh, kTerms, false);
+  ViewFactors factors = fixtures::random_view_factors(small.info.mesh->position.size(), kTerms, 8);
+  // The ground is dark and alike from everywhere: set 2.
+  for (std::size_t v = 0; v < factors.set_of.size(); ++v) factors.set_of[v] = v < first ? 0 : 2;
+  const std::size_t of_set = factors.profile.size() / 3;
+  for (std::size_t i = 2 * of_set; i < factors.profile.size(); ++i) {
+    factors.profile[i] = 0.1f * factors.profile[i];
+  }
+  small.info.view = std::make_shared<const ViewFactors>(factors);
+  const Transport transport = build_transport(small.info, small.tiles, small.thresholds);
+  std::mt19937_64 random(5);
+  std::vector<Rgb> light = fixtures::random_lighting(transport.layout(), random);
+  LightingOptions options;
+  options.method = LightingMethod::nwa;
+  options.wavelets = 90;
+  FrameRelighter relighter(transport, options, WaveletWeight::transport);
+  relighter.compare_with_reference(true);
+  relighter.judge_errors(true);
+  const Vec3 middle = small.info.mesh->origin;
+  constexpr int kFrames = 40;
+  int near = 0;
+  for (int f = 0; f < kFrames; ++f) {
+    const double turn = 2 * kPi * f / kFrames;
+    relighter.set_camera(
+        look_at(middle + Vec3{4 * std::sin(turn), 1.5, 4 * std::cos(turn)}, middle, 0.6, 60, 50));
+    light[static_cast<std::size_t>(40 + f)] += Rgb{30, 20, 10};
+    const FrameMetrics& m =
+        relighter.relight(light, f == 0 ? FrameStart::dark : FrameStart::advance, f);
+    const double ratio = *m.error_estimate / *m.image_rel_rmse;
+    near += ratio < 1.25 && ratio > 1 / 1.25;
+  }
+  EXPECT_GE(near, 0.9 * kFrames);
 }
 
 // What the pixels add up to, against pixels that were drawn; and it is no more than their norm,
