@@ -2,6 +2,7 @@
 
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -34,5 +35,13 @@ void study_chosen(const StudyOptions& options, int face, const LightingOptions& 
 /// Overbeck 2006, Figure 5. Temporal band 0 is the mean, band b >= 1 wavelets of 128 / 2^(b-1)
 /// frames.
 void study_energy(const StudyOptions& options, int face);
+
+/// A row a frame of `milliseconds` each: its metrics, for how long threads that could have run
+/// waited for a core meanwhile, how often they were taken off one, what the host took for itself;
+/// and how long kAgain runs took that were made to do the same work, bit for bit. A frame that is
+/// late and whose work is not when it is done again was held up from outside.
+void study_budget(const StudyOptions& options, const std::filesystem::path& transport,
+                  double milliseconds);
+inline constexpr std::size_t kAgain = 3;
 
 }  // namespace haarlight::bench

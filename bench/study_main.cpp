@@ -44,6 +44,10 @@ int main(int argc, char** argv) {
   chosen->add_option("--map-frames", frames)->delimiter(',');
   CLI::App* energy = common(app.add_subcommand("energy", "energy by spatial and temporal band"));
   energy->add_option("--face", face);
+  CLI::App* budget = common(app.add_subcommand("budget", "frames under a budget in time"));
+  double milliseconds = 4;
+  budget->add_option("FILE", transport)->required();
+  budget->add_option("--ms", milliseconds);
   CLI11_PARSE(app, argc, argv);
   try {
     const auto kind = motion_from_name(motion);
@@ -62,6 +66,8 @@ int main(int argc, char** argv) {
       bench::study_chosen(options, face, lighting, frames);
     } else if (*energy) {
       bench::study_energy(options, face);
+    } else if (*budget) {
+      bench::study_budget(options, transport, milliseconds);
     }
   } catch (const Error& error) {
     fmt::print(stderr, "haarlight-study: {}\n", error.what());

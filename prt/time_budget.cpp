@@ -62,6 +62,11 @@ double TimeBudget::elapsed() const {
   return std::chrono::duration<double, std::milli>(now_() - started_).count();
 }
 
+// Of frames like this one; before there were any, of the others.
+const FrameTimeModel& TimeBudget::like_this(const Models& models) const {
+  return models[models[folds()].known() ? folds() : 1 - folds()];
+}
+
 void TimeBudget::start(double milliseconds, Clock::time_point now,
                        std::span<const double> reset_bytes, double fixed_bytes, bool parts) {
   wanted_ = milliseconds;
@@ -88,8 +93,8 @@ double TimeBudget::to_take_back(const BandMask& reset) const {
 
 BandMask TimeBudget::allow(const BandMask& wanted, std::span<const double> gain) {
   const double left = aim() * wanted_ - elapsed();
-  const double bytes = parts_ ? first_[folds()].bytes_within(left - second_.predict(0))
-                              : whole_[folds()].bytes_within(left);
+  const double bytes = parts_ ? like_this(first_).bytes_within(left - second_.predict(0))
+                              : like_this(whole_).bytes_within(left);
   if (fixed_bytes_ + to_take_back(wanted) <= bytes) return wanted;
   // The most gain for its bytes first, as long as they fit.
   BandMask allowed, seen;
@@ -118,9 +123,9 @@ void TimeBudget::begin(std::span<const Rgb>, std::span<const Rgb>, const BandMas
   begun_ms_ = elapsed();
   moved_ = fixed_bytes_ + to_take_back(reset);
   const double end = aim() * wanted_;
-  allowed_ = parts_ ? first_[folds()].bytes_within(
+  allowed_ = parts_ ? like_this(first_).bytes_within(
                           std::min(kFirstPart * wanted_, end - second_.predict(0)) - begun_ms_)
-                    : whole_[folds()].bytes_within(end - begun_ms_);
+                    : like_this(whole_).bytes_within(end - begun_ms_);
   if (most_moved_ > 0) allowed_ = std::min(allowed_, 2 * most_moved_);
 }
 
@@ -154,15 +159,15 @@ void TimeBudget::remember(double ratio) {
 void TimeBudget::finish(double milliseconds) {
   if (!any_) return;  // nothing was done, and nothing is learnt
   FrameTimeModel& last = parts_ ? second_ : whole_[folds()];
+  const double predicted = (parts_ ? second_ : like_this(whole_)).predict(moved_);
   const double before = parts_ ? resumed_ms_ : begun_ms_;
   const bool warm = slower_.size() >= kWarm;
   // Of a frame that was held up, no more than this.
   const auto learn = [&](FrameTimeModel& model, double bytes, double took) {
-    model.add(bytes, warm ? std::min(took, kOutlier * model.predict(bytes)) : took);
+    model.add(bytes,
+              warm && model.known() ? std::min(took, kOutlier * model.predict(bytes)) : took);
   };
-  remember(warm              ? milliseconds / (before + last.predict(moved_))
-           : slower_.empty() ? kSlowAtFirst
-                             : 1);
+  remember(warm ? milliseconds / (before + predicted) : slower_.empty() ? kSlowAtFirst : 1);
   if (parts_) learn(first_[folds()], moved_first_, resumed_ms_ - begun_ms_);
   learn(last, moved_, milliseconds - before);
   most_moved_ = std::max(most_moved_, moved_first_ + moved_);

@@ -22,6 +22,8 @@ class FrameTimeModel {
   /// A frame that had `bytes` to move took `milliseconds`.
   void add(double bytes, double milliseconds);
   double predict(double bytes) const { return fixed_ + per_byte_ * bytes; }
+  /// Whether anything was measured.
+  bool known() const { return weight_ > 0; }
   /// The most bytes that are predicted to take at most so long; 0 if none.
   double bytes_within(double milliseconds) const;
 
@@ -75,7 +77,9 @@ class TimeBudget final : public UpdateLimit {
   std::vector<double> column_bytes_;
   // Of frames in one part, and of first parts, without and with fixed bytes: those are streamed,
   // which is faster a byte than columns are. Of second parts.
-  std::array<FrameTimeModel, 2> whole_, first_;
+  using Models = std::array<FrameTimeModel, 2>;
+  const FrameTimeModel& like_this(const Models& models) const;
+  Models whole_, first_;
   FrameTimeModel second_;
   Clock::time_point (*now_)() = &Clock::now;
   std::array<double, HaarLayout::kMaxBands> reset_bytes_{};

@@ -153,6 +153,37 @@ TEST(TimeBudget, FramesThatFoldAreLearntApart) {
   EXPECT_NEAR(frame(0), before, 0.03 * before);
 }
 
+// The first frame that folds is foreseen by what others took, not by a guess about the machine:
+// this one is ten times slower than the guess.
+TEST(TimeBudget, TheFirstFrameThatFoldsKnowsTheMachine) {
+  for (const bool parts : {false, true}) {
+    TimeBudget budget(std::vector<double>(1000, 1e3));
+    budget.set_clock(made_up_now);
+    const std::array<double, HaarLayout::kMaxBands> none{};
+    for (int frame = 0; frame < 40; ++frame) {
+      const double fold = frame == 30 ? 1e5 : 0;
+      budget.start(4, g_now, none, fold, parts);
+      budget.begin({}, {}, {});
+      double took = 0;
+      const auto part = [&](double moved) {
+        for (int i = 0; i < 100000 && budget.take(i % 1000, {}); ++i) moved += 1e3;
+        const double ms = 0.2 + 2.5e-6 * moved;
+        pass(ms);
+        took += ms;
+      };
+      part(fold);
+      if (parts) {
+        budget.resume();
+        part(0);
+      }
+      budget.finish(took);
+      if (frame >= 30) {
+        EXPECT_LE(took, 1.1 * 4) << frame << " " << parts;
+      }
+    }
+  }
+}
+
 // Taking back a band may cost more than the whole frame may: then it waits.
 TEST(TimeBudget, ResetsThatDoNotFitArePutOff) {
   // 1.4 ms hold 12 MB, and bands are up to 40 MB.
