@@ -475,11 +475,6 @@ AnimatedScene::AnimatedScene(const std::filesystem::path& file, double frames_pe
 AnimatedScene::~AnimatedScene() = default;
 AnimatedScene::AnimatedScene(AnimatedScene&&) noexcept = default;
 
-RgbD AnimatedFrame::background_from(const Vec3& direction) const {
-  if (!environment) return background;
-  return background + environment->radiance(environment_turn.transposed() * direction);
-}
-
 void AnimatedScene::set_environment(std::shared_ptr<const EnvironmentLight> light, double start,
                                     double a_second) {
   parts_->environment = std::move(light);

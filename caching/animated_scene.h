@@ -33,6 +33,15 @@ struct AnimatedFrame {
 
   /// What comes from a direction (unit, world) where nothing is in the way.
   RgbD background_from(const Vec3& direction) const;
+  /// The same without the picture's small suns, and those as directional lamps.
+  RgbD background_without_suns(const Vec3& direction) const;
+  std::vector<SceneLight> suns() const;
+  struct BackgroundSample {
+    Vec3 from;   ///< unit
+    RgbD light;  ///< radiance without suns over the chance of the direction per solid angle
+  };
+  /// A direction by two numbers in [0, 1), often from where light is.
+  BackgroundSample sample_background(double u, double v) const;
 };
 
 /// Reads .gltf and .glb. What moves:

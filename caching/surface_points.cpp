@@ -34,6 +34,7 @@ class Tile {
        std::span<const VirtualLight> shining)
       : scene_(scene), options_(options), shining_(shining) {
     lamps_ = scene.frame().light;
+    for (const SceneLight& sun : scene.frame().suns()) lamps_.push_back(sun);
     for (SceneLight& lamp : lamps_) {
       lamp.position = scene.to_local(lamp.position);
       packet_.emplace_back().origin = floats(lamp.position);
@@ -94,7 +95,8 @@ class Tile {
     const AnimatedFrame& frame = scene_.frame();
     RgbD& light = light_[ray.pixel];
     if (!hit) {
-      light += ray.weight * frame.background_from(ray.way);
+      light += ray.weight * (ray.shines ? frame.background_from(ray.way)
+                                        : frame.background_without_suns(ray.way));
       return;
     }
     const SurfaceHit surface = scene_.surface(*hit, ray.way);
@@ -241,7 +243,7 @@ class Tile {
   const MovingVisibility& scene_;
   const SurfacePointOptions& options_;
   std::span<const VirtualLight> shining_;
-  std::vector<SceneLight> lamps_;  // local
+  std::vector<SceneLight> lamps_;  // local, suns of the background last
   std::span<const std::uint64_t> keys_;
   std::vector<RgbD> light_;
   std::vector<Ray> now_, next_;

@@ -35,8 +35,9 @@ struct SurfacePointOptions {
 
 /// One ray through the middle of each pixel, on through mirrors and glass (up to 8, while a
 /// thousandth of the light is left) and along narrow lobes once. `picture` receives the light of
-/// lamps, of shining materials and of the background, hard shadows; `rows` the points. Lamps do not
-/// shine through glass. `progress_row` is called after each few rows.
+/// lamps, of shining materials, of the background's small suns and of the background where it is
+/// seen, hard shadows; `rows` the points. Lamps do not shine through glass. `progress_row` is
+/// called after each few rows.
 void surface_points(const MovingVisibility& scene, const Camera& camera,
                     const SurfacePointOptions& options, Image& picture,
                     std::vector<SurfaceRow>& rows,

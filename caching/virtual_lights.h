@@ -42,8 +42,9 @@ struct VirtualLightOptions {
   std::uint64_t seed = 1;
 };
 
-/// The lights of a frame by number. Every lamp, every material that shines and the background have
-/// the same share of the numbers. A path of number i takes its directions from point i of one
+/// The lights of a frame by number. Every lamp, every material that shines, all small suns of the
+/// background and what is left of it have the same share of the numbers, and the directions of that
+/// another. A path of number i takes its directions from point i of one
 /// scrambled Halton sequence (Keller 1997; Debattista and others 2009, section 3.2), in each frame
 /// the same, so that where nothing moves light i is the same bits. A fixed part of the paths goes
 /// on: as many as half of those before, each weighted for those that do not; no albedo decides it,
