@@ -44,4 +44,12 @@ void study_budget(const StudyOptions& options, const std::filesystem::path& tran
                   double milliseconds);
 inline constexpr std::size_t kAgain = 3;
 
+/// A picture's transport at `bits` an entry (2 to 8), a scale a block as it is: a row a frame with
+/// the bytes of the file and those it would have, the entries that are not zero then, and relative
+/// RMS errors against all coefficients as stored: of all coefficients, and of the 40, 100 and 200
+/// largest by area (Ng 2003), at `bits` and as stored.
+void study_bits(const StudyOptions& options, const std::filesystem::path& transport, int bits);
+
+void write_text(const std::filesystem::path& path, const std::string& text);
+
 }  // namespace haarlight::bench

@@ -9,7 +9,6 @@
 #include <string>
 
 #include "bench/study.h"
-#include "core/atomic_file.h"
 #include "prt/frame_relighter.h"
 #include "prt/motion.h"
 #include "prt/transport.h"
@@ -94,9 +93,7 @@ void study_budget(const StudyOptions& options, const std::filesystem::path& file
         frame.held.switches, frame.held.stolen_ms, frame.again_ms.front(),
         frame.again_ms[kAgain / 2]);
   }
-  AtomicFile out(options.output);
-  out.write(text.data(), text.size());
-  out.commit();
+  write_text(options.output, text);
 }
 
 }  // namespace haarlight::bench

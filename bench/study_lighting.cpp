@@ -13,12 +13,6 @@
 namespace haarlight::bench {
 namespace {
 
-void write(const std::filesystem::path& path, const std::string& text) {
-  AtomicFile file(path);
-  file.write(text.data(), text.size());
-  file.commit();
-}
-
 struct Light {
   Light(const StudyOptions& options, int face)
       : layout(face),
@@ -52,6 +46,12 @@ void cover(const HaarLayout& layout, int index, std::vector<int>& count) {
 
 }  // namespace
 
+void write_text(const std::filesystem::path& path, const std::string& text) {
+  AtomicFile file(path);
+  file.write(text.data(), text.size());
+  file.commit();
+}
+
 void study_chosen(const StudyOptions& options, int face, const LightingOptions& lighting,
                   const std::vector<int>& maps) {
   Light light(options, face);
@@ -83,8 +83,8 @@ void study_chosen(const StudyOptions& options, int face, const LightingOptions& 
       }
     }
   }
-  write(options.output, rows);
-  write(options.output.string() + ".map.csv", map);
+  write_text(options.output, rows);
+  write_text(options.output.string() + ".map.csv", map);
 }
 
 void study_energy(const StudyOptions& options, int face) {
@@ -127,7 +127,7 @@ void study_energy(const StudyOptions& options, int face) {
                           energy[static_cast<std::size_t>(b * kTemporal + t)]);
     }
   }
-  write(options.output, rows);
+  write_text(options.output, rows);
 }
 
 }  // namespace haarlight::bench

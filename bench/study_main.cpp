@@ -48,6 +48,10 @@ int main(int argc, char** argv) {
   double milliseconds = 4;
   budget->add_option("FILE", transport)->required();
   budget->add_option("--ms", milliseconds);
+  CLI::App* bits_verb = common(app.add_subcommand("bits", "a transport at fewer bits an entry"));
+  int bits = 6;
+  bits_verb->add_option("FILE", transport)->required();
+  bits_verb->add_option("--bits", bits);
   CLI11_PARSE(app, argc, argv);
   try {
     const auto kind = motion_from_name(motion);
@@ -68,6 +72,8 @@ int main(int argc, char** argv) {
       bench::study_energy(options, face);
     } else if (*budget) {
       bench::study_budget(options, transport, milliseconds);
+    } else if (*bits_verb) {
+      bench::study_bits(options, transport, bits);
     }
   } catch (const Error& error) {
     fmt::print(stderr, "haarlight-study: {}\n", error.what());

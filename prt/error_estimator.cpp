@@ -36,6 +36,27 @@ HAARLIGHT_MULTIVERSION void add_sketch(const float* column, const float* x, std:
   }
 }
 
+// Sums of a column's norms and sums by its change and its light, [channel][group].
+struct BoundSums {
+  float *change, *light;
+  double* sum;
+};
+
+HAARLIGHT_MULTIVERSION void add_bounds(const float* norm, const float* sum, const float* change,
+                                       const float* light, std::size_t groups,
+                                       const BoundSums& out) {
+  for (std::size_t ch = 0; ch < 3; ++ch) {
+    const float most = std::abs(change[ch]), bright = std::abs(light[ch]);
+    const auto exact = static_cast<double>(light[ch]);
+    const std::size_t first = ch * groups;
+    for (std::size_t g = 0; g < groups; ++g) {
+      out.change[first + g] += most * norm[first + g];
+      out.light[first + g] += bright * norm[first + g];
+      out.sum[first + g] += exact * static_cast<double>(sum[first + g]);
+    }
+  }
+}
+
 double squared(double x) { return x * x; }
 
 }  // namespace
@@ -118,13 +139,9 @@ void ErrorEstimator::sum_up(std::span<const Rgb> target, std::span<const Rgb> sh
       if (changed) add_sketch(column, change, t.lanes, t.sketch_size(), s.change.data());
       if (lit) add_sketch(column, light, t.lanes, t.sketch_size(), s.target.data());
       if (!with_bound) continue;
-      const float* norm = t.norm.data() + j * t.groups * 3;
-      const float* sum = t.sum.data() + j * t.groups * 3;
-      for (std::size_t k = 0; k < 3 * t.groups; ++k) {
-        s.change_bound[k] += std::abs(change[k % 3]) * norm[k];
-        s.target_bound[k] += std::abs(light[k % 3]) * norm[k];
-        s.target_sum[k] += static_cast<double>(light[k % 3]) * static_cast<double>(sum[k]);
-      }
+      const std::size_t at = j * t.groups * 3;
+      add_bounds(t.norm.data() + at, t.sum.data() + at, change, light, t.groups,
+                 {s.change_bound.data(), s.target_bound.data(), s.target_sum.data()});
     }
   });
   for (auto* sums : {&change_, &target_, &change_bound_, &target_bound_, &target_sum_}) {
@@ -191,7 +208,7 @@ PictureErrorGuess ErrorEstimator::judge(std::span<const Rgb> target, std::span<c
   double most = 0, by_means = 0;
   for (std::size_t g = 0; g < t.groups; ++g) {
     for (std::size_t ch = 0; ch < 3; ++ch) {
-      const std::size_t k = 3 * g + ch;
+      const std::size_t k = ch * t.groups + g;
       if (change_bound_[k] > 0) most += view_most_[g] * squared(kSumRounding * change_bound_[k]);
       if (mesh_ || t.group_rows[g] == 0) continue;
       const double rows = static_cast<double>(t.group_rows[g]);

@@ -53,10 +53,11 @@ class ErrorEstimator final : public ErrorJudge {
   std::vector<double> view_mean_, view_most_;  // per group: see the source
   double calibration_ = 1;                     // || picture || over the sketch's norm
 
-  // Of the frame: sketches of d and of the target, [group][channel][lane], and for the bound.
+  // Of the frame: sketches of d and of the target, [group][channel][lane], and for the bound,
+  // [channel][group].
   std::vector<double> change_, target_;
-  std::vector<double> change_bound_, target_bound_, target_sum_;  // [group][channel]
-  struct Slice {                                                  // likewise, of some coefficients
+  std::vector<double> change_bound_, target_bound_, target_sum_;
+  struct Slice {  // likewise, of some coefficients
     std::vector<float> change, target, change_bound, target_bound;
     std::vector<double> target_sum;
   };

@@ -17,7 +17,7 @@ namespace {
 constexpr auto kRows = static_cast<std::size_t>(kBlockRows);
 constexpr std::size_t kBlock = 3 * kRows;  // [channel][row of block]
 constexpr int kColumnsOfTask = 64;
-constexpr std::size_t kPictureGroups = 8, kMeshGroups = 32, kMeshLanes = 4;
+constexpr std::size_t kPictureGroups = 64, kMeshGroups = 32, kMeshLanes = 4;
 
 // Norms are sums of floats: at most 256 blocks of squares in a lane, each square rounded three
 // times, are within 260 x 2^-24 < 2e-5 of the truth.
@@ -162,12 +162,12 @@ ErrorTables::ErrorTables(const Transport& transport) {
                    [&](std::size_t group, const GroupSums& part) {
                      double* to = sketches.data() + column * sketch_size() +
                                   (sketch_groups > 1 ? group * 3 * lanes : 0);
-                     const std::size_t at = (column * groups + group) * 3;
+                     const std::size_t at = column * 3 * groups + group;
                      for (std::size_t k = 0; k < kBlock; ++k) {
                        const std::size_t ch = k / kRows;
                        to[ch * lanes + k % lanes] += static_cast<double>(part.sketch[k]);
-                       squares[at + ch] += static_cast<double>(part.square[k]);
-                       sums[at + ch] += static_cast<double>(part.sum[k]);
+                       squares[at + ch * groups] += static_cast<double>(part.square[k]);
+                       sums[at + ch * groups] += static_cast<double>(part.sum[k]);
                      }
                    });
       }

@@ -37,7 +37,7 @@ struct ErrorTables {
   std::size_t sketch_size() const { return sketch_groups * 3 * lanes; }
 
   HugePageVector<float> sketch;  ///< per coefficient: [sketch group][channel][lane]
-  HugePageVector<float> norm;    ///< [group][channel]: L2 norm of weighted entries, never too small
+  HugePageVector<float> norm;    ///< [channel][group]: L2 norm of weighted entries, never too small
   HugePageVector<float> sum;     ///< likewise: sum of weighted entries
 
   std::vector<float> area;              ///< of each row as stored: its squared weight; 0: padding

@@ -71,9 +71,9 @@ TEST(ErrorTables, NormsAndSumsAreThoseOfTheColumns) {
       }
       double norm2 = 0, total = 0;
       for (std::size_t g = 0; g < tables.groups; ++g) {
-        const auto norm = static_cast<double>(tables.norm[(j * tables.groups + g) * 3 + ch]);
+        const auto norm = static_cast<double>(tables.norm[(3 * j + ch) * tables.groups + g]);
         norm2 += norm * norm;
-        total += static_cast<double>(tables.sum[(j * tables.groups + g) * 3 + ch]);
+        total += static_cast<double>(tables.sum[(3 * j + ch) * tables.groups + g]);
       }
       // Never too small; too large by twice the 2e-5 that are added to be sure.
       EXPECT_GE(norm2, squares);
