@@ -36,7 +36,7 @@ HAARLIGHT_MULTIVERSION void add_sketch(const float* column, const float* x, std:
   }
 }
 
-// Sums of a column's norms and sums by its change and its light, [channel][group].
+// Sums over columns, [channel][group]. No `sum` column: no sums.
 struct BoundSums {
   float *change, *light;
   double* sum;
@@ -52,6 +52,9 @@ HAARLIGHT_MULTIVERSION void add_bounds(const float* norm, const float* sum, cons
     for (std::size_t g = 0; g < groups; ++g) {
       out.change[first + g] += most * norm[first + g];
       out.light[first + g] += bright * norm[first + g];
+    }
+    if (!sum) continue;
+    for (std::size_t g = 0; g < groups; ++g) {
       out.sum[first + g] += exact * static_cast<double>(sum[first + g]);
     }
   }
@@ -110,11 +113,12 @@ void ErrorEstimator::look(const PictureView& view) {
     const std::size_t g = t.group_of_row(row);
     const auto w = static_cast<double>(weights[row_output_[row]]);
     const auto a = static_cast<double>(t.area[row]);
-    share[g] += w;
-    area[g] += a;
+    share[t.sketch_of_group(g)] += w;
+    area[t.sketch_of_group(g)] += a;
     view_most_[g] = std::max(view_most_[g], w / (a + 1));
   }
-  for (std::size_t g = 0; g < t.groups; ++g) view_mean_[g] = area[g] > 0 ? share[g] / area[g] : 0;
+  for (std::size_t g = 0; g < area.size(); ++g)
+    view_mean_[g] = area[g] > 0 ? share[g] / area[g] : 0;
   calibration_ = 1;
 }
 
@@ -140,7 +144,7 @@ void ErrorEstimator::sum_up(std::span<const Rgb> target, std::span<const Rgb> sh
       if (lit) add_sketch(column, light, t.lanes, t.sketch_size(), s.target.data());
       if (!with_bound) continue;
       const std::size_t at = j * t.groups * 3;
-      add_bounds(t.norm.data() + at, t.sum.data() + at, change, light, t.groups,
+      add_bounds(t.norm.data() + at, mesh_ ? nullptr : t.sum.data() + at, change, light, t.groups,
                  {s.change_bound.data(), s.target_bound.data(), s.target_sum.data()});
     }
   });

@@ -17,7 +17,7 @@ namespace {
 constexpr auto kRows = static_cast<std::size_t>(kBlockRows);
 constexpr std::size_t kBlock = 3 * kRows;  // [channel][row of block]
 constexpr int kColumnsOfTask = 64;
-constexpr std::size_t kPictureGroups = 64, kMeshGroups = 32, kMeshLanes = 4;
+constexpr std::size_t kPictureGroups = 64, kMeshGroups = 128, kMeshSketches = 32, kMeshLanes = 4;
 
 // Norms are sums of floats: at most 256 blocks of squares in a lane, each square rounded three
 // times, are within 260 x 2^-24 < 2e-5 of the truth.
@@ -109,7 +109,7 @@ ErrorTables::ErrorTables(const Transport& transport) {
   const bool mesh = transport.kind() == TransportKind::mesh;
   lanes = mesh ? kMeshLanes : kRows;
   groups = std::clamp<std::size_t>(blocks, 1, mesh ? kMeshGroups : kPictureGroups);
-  sketch_groups = mesh ? groups : 1;
+  sketch_groups = mesh ? std::min(groups, kMeshSketches) : 1;
 
   // Areas, colours and signs of rows. Groups share out the blocks that have a meaning.
   std::vector<float> of_output;
@@ -144,7 +144,7 @@ ErrorTables::ErrorTables(const Transport& transport) {
 
   sketch.resize(columns * sketch_size());
   norm.resize(columns * groups * 3);
-  sum.resize(columns * groups * 3);
+  if (!mesh) sum.resize(columns * groups * 3);
   const int tasks = (static_cast<int>(columns) + kColumnsOfTask - 1) / kColumnsOfTask;
   parallel_for(tasks, [&](int task) {
     const int begin = task * kColumnsOfTask;
@@ -161,7 +161,7 @@ ErrorTables::ErrorTables(const Transport& transport) {
         add_column(transport.rgb_blocks(chunk), stored, first, all, group_of_block_,
                    [&](std::size_t group, const GroupSums& part) {
                      double* to = sketches.data() + column * sketch_size() +
-                                  (sketch_groups > 1 ? group * 3 * lanes : 0);
+                                  sketch_of_group(group) * 3 * lanes;
                      const std::size_t at = column * 3 * groups + group;
                      for (std::size_t k = 0; k < kBlock; ++k) {
                        const std::size_t ch = k / kRows;
@@ -178,7 +178,7 @@ ErrorTables::ErrorTables(const Transport& transport) {
     }
     for (std::size_t i = 0; i < squares.size(); ++i) {
       norm[place * groups * 3 + i] = static_cast<float>(std::sqrt(squares[i]) * kNormRounding);
-      sum[place * groups * 3 + i] = static_cast<float>(sums[i]);
+      if (!mesh) sum[place * groups * 3 + i] = static_cast<float>(sums[i]);
     }
   });
 }

@@ -32,17 +32,18 @@ struct ErrorTables {
   explicit ErrorTables(const Transport& transport);
 
   std::size_t lanes = kBlockRows;  ///< of a sketch's channel: 16 of a picture, 4 of a mesh
-  std::size_t sketch_groups = 1;   ///< groups with a sketch of their own: 1 of a picture
+  std::size_t sketch_groups = 1;   ///< sketches that groups share: 1 of a picture
   std::size_t groups = 1;          ///< groups with norms and sums of their own
   std::size_t sketch_size() const { return sketch_groups * 3 * lanes; }
 
   HugePageVector<float> sketch;  ///< per coefficient: [sketch group][channel][lane]
   HugePageVector<float> norm;    ///< [channel][group]: L2 norm of weighted entries, never too small
-  HugePageVector<float> sum;     ///< likewise: sum of weighted entries
+  HugePageVector<float> sum;     ///< likewise: sum of weighted entries; empty of a mesh
 
   std::vector<float> area;              ///< of each row as stored: its squared weight; 0: padding
   std::vector<std::size_t> group_rows;  ///< per group: rows with a meaning
   std::size_t group_of_row(std::size_t row) const { return group_of_block_[row / kBlockRows]; }
+  std::size_t sketch_of_group(std::size_t group) const { return group * sketch_groups / groups; }
   std::uint64_t bytes() const { return 4 * (sketch.size() + norm.size() + sum.size()); }
 
  private:

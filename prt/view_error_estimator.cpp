@@ -14,7 +14,8 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t kMostSamples = 512, kMostSums = 4096, kLeastSamples = 64;
-constexpr std::size_t kMostClasses = 128, kMostGroups = 32;
+// Classes are groups times terms. The more, the sharper the bound, and the longer it takes.
+constexpr std::size_t kNormBytes = 40u << 20, kMostClasses = 1024, kMostGroups = 256;
 // Rounding of a pixel from vertices, see prt/error_estimator.cpp; of a vertex from K terms, a
 // product and sums each.
 constexpr double kPixelRounding = 64 * 0x1p-24, kUnit = 0x1p-24;
@@ -61,7 +62,9 @@ ViewErrorEstimator::ViewErrorEstimator(const Transport& transport)
   vertices_ = info.mesh->position.size();
   terms_ = static_cast<std::size_t>(info.terms);
   area_ = relative_vertex_areas(*info.mesh);
-  groups_ = std::clamp<std::size_t>(kMostClasses / terms_, 1, kMostGroups);
+  const auto columns = static_cast<std::size_t>(transport.layout().size());
+  const std::size_t classes = std::min(kNormBytes / (3 * sizeof(float) * columns), kMostClasses);
+  groups_ = std::clamp<std::size_t>(classes / terms_, 1, kMostGroups);
   const auto rows = static_cast<std::size_t>(transport.rows());
   std::vector<std::uint32_t> class_of(rows, kNoOutput);
   std::vector<float> weight_of(rows, 0.0f);

@@ -13,6 +13,7 @@
 #include "prt/finish_rows.h"
 #include "prt/frame_relighter.h"
 #include "prt/picture_sum.h"
+#include "prt/term_norms.h"
 #include "prt/view_error_estimator.h"
 #include "tests/cpca/inputs.h"
 
@@ -140,6 +141,37 @@ TEST_F(ViewErrors, SampledRowsAreThoseOfTheTransport) {
     most = std::max(most, l1_norm(light[s]));
   }
   EXPECT_LT(apart, 1e-5 * most);
+}
+
+// Against dense rows: never too small, too large by the 2e-6 that are added to be sure, twice over.
+TEST_F(ViewErrors, NormsOfClassesAreThoseOfTheirRows) {
+  const std::vector<double> dense = fixtures::dense_rows(*terms_);
+  const auto size = static_cast<std::size_t>(terms_->layout().size());
+  const auto rows = static_cast<std::size_t>(terms_->rows());
+  constexpr std::size_t kClasses = 5;
+  std::vector<std::uint32_t> class_of(rows, kNoOutput);
+  std::vector<float> weight(rows, 0.0f);
+  std::vector<double> squares(size * kClasses * 3);
+  for (std::size_t row = 0; row < rows; ++row) {
+    const std::uint32_t output = terms_->row_output()[row];
+    if (output == kNoOutput || row % 13 == 0) continue;
+    class_of[row] = static_cast<std::uint32_t>(row / 40 % kClasses);  // some blocks are of two
+    weight[row] = 1 + static_cast<float>(row % 3);
+    for (std::size_t j = 0; j < size; ++j) {
+      for (std::size_t ch = 0; ch < 3; ++ch) {
+        const double t = dense[(3 * output + ch) * size + j];
+        squares[(j * kClasses + class_of[row]) * 3 + ch] +=
+            static_cast<double>(weight[row]) * t * t;
+      }
+    }
+  }
+  const TermNorms norms(*terms_, class_of, weight, kClasses);
+  ASSERT_EQ(norms.norm.size(), squares.size());
+  for (std::size_t i = 0; i < squares.size(); ++i) {
+    const double norm = static_cast<double>(norms.norm[i]), right = std::sqrt(squares[i]);
+    ASSERT_GE(norm, right) << i;
+    ASSERT_LE(norm, right * (1 + 1e-5)) << i;
+  }
 }
 
 TEST_F(ViewErrors, BoundsHoldInEveryFrameAndEstimatesAreNear) {

@@ -7,6 +7,8 @@
 planted/NN_name.patch is a fault that row NN must catch; its first lines say what it is:
     Fault: sums in float
     Red: HardCases.Row01_*        (which tests must fail; by default all of the row's)
+    Binary: test_hard_numbers     (which holds them; by default the one of tests/hard that does)
+What is not about a row has no number before its name, and says Red and Binary.
 The tree is copied, built and found green; then each fault is applied, the one binary that holds its
 row is built and run, and the fault is taken back. A fault that does not compile is an error, one
 that the row survives is "not caught". Prints a table; exit code 1 unless all are caught.
@@ -39,14 +41,16 @@ class Fault:
         self.path = path
         self.name = path.stem
         row = re.match(r"(\d+)_", self.name)
-        if not row:
-            sys.exit(f"{path}: wanted a name that begins with the number of its row")
         head = path.read_text().split("\n--- ")[0]
         said = re.search(r"^Fault: (.+)$", head, re.MULTILINE)
         if not said:
             sys.exit(f"{path}: wanted a line 'Fault: what is wrong'")
         red = re.search(r"^Red: (\S+)$", head, re.MULTILINE)
+        binary = re.search(r"^Binary: (\S+)$", head, re.MULTILINE)
+        if not row and not (red and binary):
+            sys.exit(f"{path}: wanted a name that begins with the number of its row, or Red and Binary")
         self.what = said.group(1)
+        self.binary = binary.group(1) if binary else None
         self.hash = hashlib.sha256(path.read_bytes()).hexdigest()
         self.red = red.group(1) if red else f"HardCases.Row{int(row.group(1)):02d}_*"
 
@@ -209,12 +213,14 @@ def main():
     copy_tree(tree)
     seen = Seen(tree, options.resume)
     build = Build(tree, options.jobs, shlex.split(options.prefix), shlex.split(options.cmake))
+    named = {fault.binary for fault in faults if fault.binary}
+    build.binaries = sorted(named if all(f.binary for f in faults) else named | set(build.binaries))
     build.make(*build.binaries, must=True)
     tests = {binary: build.list_tests(binary) for binary in build.binaries}
     placed = []
     for fault in faults:
-        binary = next((b for b in build.binaries if any(fnmatch.fnmatchcase(name, fault.red)
-                                                        for name in tests[b])), None)
+        binary = next((b for b in build.binaries if fault.binary in (None, b)
+                       and any(fnmatch.fnmatchcase(name, fault.red) for name in tests[b])), None)
         if not binary:
             sys.exit(f"{fault.path}: no test is called {fault.red}")
         placed.append((fault, binary))
