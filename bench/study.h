@@ -50,6 +50,11 @@ inline constexpr std::size_t kAgain = 3;
 /// largest by area (Ng 2003), at `bits` and as stored.
 void study_bits(const StudyOptions& options, const std::filesystem::path& transport, int bits);
 
+/// Bounds of the error of a picture's transport from norms over so many rows each, relative as the
+/// error is, by NWA and PBI of 30 and 100 wavelets in every 35th frame; in green, what largest
+/// singular values of bands would make of them (approached from below: no bound).
+void study_norms(const StudyOptions& options, const std::filesystem::path& transport);
+
 void write_text(const std::filesystem::path& path, const std::string& text);
 
 }  // namespace haarlight::bench

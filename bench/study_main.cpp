@@ -52,6 +52,8 @@ int main(int argc, char** argv) {
   int bits = 6;
   bits_verb->add_option("FILE", transport)->required();
   bits_verb->add_option("--bits", bits);
+  CLI::App* norms = common(app.add_subcommand("norms", "bounds by norms over groups of rows"));
+  norms->add_option("FILE", transport)->required();
   CLI11_PARSE(app, argc, argv);
   try {
     const auto kind = motion_from_name(motion);
@@ -74,6 +76,8 @@ int main(int argc, char** argv) {
       bench::study_budget(options, transport, milliseconds);
     } else if (*bits_verb) {
       bench::study_bits(options, transport, bits);
+    } else if (*norms) {
+      bench::study_norms(options, transport);
     }
   } catch (const Error& error) {
     fmt::print(stderr, "haarlight-study: {}\n", error.what());

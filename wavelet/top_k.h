@@ -18,6 +18,7 @@ class TopK {
 
  private:
   std::vector<std::uint64_t> packed_;
+  std::vector<std::uint32_t> sample_;
 };
 
 /// The same order one by one, for when it is not known before how many are wanted. Sorts as far as
@@ -29,8 +30,10 @@ class RankedKeys {
   int next();
 
  private:
-  std::vector<std::uint64_t> packed_;  // descending up to sorted_
-  std::size_t next_ = 0, sorted_ = 0;
+  // Descending up to sorted_; those before large_ are larger than those behind it.
+  std::vector<std::uint64_t> packed_;
+  std::vector<std::uint32_t> sample_;
+  std::size_t next_ = 0, sorted_ = 0, large_ = 0;
 };
 
 }  // namespace haarlight

@@ -39,6 +39,39 @@ TEST(TopK, EqualsSortingWithManyTies) {
   }
 }
 
+// Thousands of keys, of which a sample says which are large: whether they are spread evenly, all
+// the same, few, or so that the sample knows nothing of them.
+TEST(TopK, EqualsSortingWhateverASampleSays) {
+  std::mt19937 random(6);
+  constexpr std::size_t kKeys = 6000;
+  TopK top;
+  RankedKeys ranked;
+  std::vector<int> chosen;
+  for (int kind = 0; kind < 5; ++kind) {
+    std::vector<float> keys(kKeys);
+    for (std::size_t i = 0; i < kKeys; ++i) {
+      const auto u = static_cast<float>(random()) * 0x1p-32f;
+      keys[i] = kind == 0   ? u
+                : kind == 1 ? 1
+                : kind == 2 ? (i % 700 == 3 ? u : 0)
+                : kind == 3 ? (i % 16 == 0 ? 10 + u : u)                           // sampled: large
+                            : (i % 16 == 0 ? u / 10 : std::pow(u, 20.0f) - 0.1f);  // small
+    }
+    for (const int k : {1, 30, 300, 500, 5999, 6000, 7000}) {
+      top.select(keys, k, chosen);
+      const std::vector<int> right = by_sorting(keys, k);
+      EXPECT_EQ(chosen, right) << kind << " " << k;
+      ranked.start(keys);
+      std::vector<int> one_by_one;
+      for (int i = 0; i < k; ++i) {
+        if (const int index = ranked.next(); index >= 0) one_by_one.push_back(index);
+      }
+      std::sort(one_by_one.begin(), one_by_one.end());
+      EXPECT_EQ(one_by_one, right) << kind << " " << k;
+    }
+  }
+}
+
 TEST(TopK, NeverChoosesNothingOrNaN) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const std::vector<float> keys{nan,    0.0f, -1.0f,
