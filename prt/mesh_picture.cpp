@@ -29,6 +29,7 @@ namespace {
 constexpr int kBandRows = 8;
 constexpr int kSliceTriangles = 2048;
 constexpr int kMostSamples = 4;
+constexpr int kNarrow = 4;  // pixels: triangles up to so wide are looked at without much ado
 constexpr std::uint32_t kNothing = 0xffffffffu;
 
 struct Place {
@@ -307,11 +308,26 @@ void MeshPicture::State::draw_band(int band, std::vector<Sample>& samples) {
     Setup s;
     Bounds box;
     if (!bounds(triangle, box) || !set_up(triangle, s)) continue;
+    const bool wide = box.right - box.left > kNarrow;
+    double along[3];  // how far along a row an edge goes with one unit of e
+    for (std::size_t j = 0; wide && j < 3; ++j) along[j] = -1 / s.a[j];
     for (int y = std::max(box.top, first_row); y < std::min(box.bottom, end_row); ++y) {
       double row_e[3];
       for (std::size_t j = 0; j < 3; ++j) row_e[j] = s.b[j] * (y - s.y0[j]) + s.c[j];
       Sample* row = samples.data() + static_cast<std::size_t>(y - first_row) * row_samples;
-      for (int x = box.left; x < box.right; ++x) {
+      int left = box.left, right = box.right;
+      if (wide) {
+        // Only where the row is inside of all edges, give or take a pixel for rounding.
+        double from = left, to = right;
+        for (std::size_t j = 0; j < 3; ++j) {
+          const double border = s.x0[j] + (row_e[j] + s.most_at_place[j]) * along[j];
+          if (s.a[j] > 0 && border - 1 > from) from = border - 1;
+          if (s.a[j] < 0 && border + 2 < to) to = border + 2;
+        }
+        if (!(from < to)) continue;
+        left = static_cast<int>(from), right = static_cast<int>(to);
+      }
+      for (int x = left; x < right; ++x) {
         double corner[3];
         for (std::size_t j = 0; j < 3; ++j) corner[j] = s.a[j] * (x - s.x0[j]) + row_e[j];
         if (corner[0] + s.most_at_place[0] < 0 || corner[1] + s.most_at_place[1] < 0 ||
