@@ -67,6 +67,7 @@ void InstantCache::drop(std::size_t number) {
 }
 
 bool InstantCache::is_stale(std::size_t record) const {
+  if (record_[record].hollow) return true;
   const auto begin = stale_.begin() + static_cast<std::ptrdiff_t>(record * words_);
   return std::any_of(begin, begin + static_cast<std::ptrdiff_t>(words_),
                      [](std::uint64_t bits) { return bits != 0; });
@@ -117,14 +118,19 @@ void InstantCache::update(const MovingVisibility& scene, std::vector<VirtualLigh
     }
   }
   std::vector<Counts> counts(record_.size());
+  std::vector<char> emptied(record_.size());
   parallel_for(
       static_cast<int>(record_.size()),
       [&](int i) {
         const auto r = static_cast<std::size_t>(i);
-        if (record_[r].alive && go_on(scene, r, counts[r])) sum(r);
+        if (!record_[r].alive) return;
+        const bool before = record_[r].hollow;
+        if (go_on(scene, r, counts[r])) sum(r);
+        emptied[r] = record_[r].hollow != before;
       },
       kRecordsAtOnce);
   for (const Counts& c : counts) c.add_to(report);
+  indexed_ = indexed_ && std::ranges::find(emptied, 1) == emptied.end();
 }
 
 // Algorithm 1 for one record: cheap tests first. Whether any of its lights has changed.
@@ -134,9 +140,11 @@ bool InstantCache::go_on(const MovingVisibility& scene, std::size_t number, Coun
   std::uint64_t* stale = stale_.data() + number * words_;
   const bool rides = scene.moved(record.place.triangle);
   if (rides) put(scene, record);
-  // Nobody has asked for it lately: looked at when somebody does.
-  if (options_.on_demand && record.used < frame_ - 1 && (scene.any_moved() || any_changed_)) {
-    std::fill_n(stale, words_, ~std::uint64_t{0});
+  if (record.hollow) return false;
+  // Case 5; or nobody has asked for it lately. Looked at when somebody does.
+  const bool unasked = record.used < frame_ - 1 && (scene.any_moved() || any_changed_);
+  if (options_.on_demand && (rides || unasked)) {
+    record.hollow = true;
     return false;
   }
   if (!scene.any_moved() && !any_changed_) {
@@ -196,13 +204,15 @@ bool InstantCache::go_on(const MovingVisibility& scene, std::size_t number, Coun
 void InstantCache::refresh(const MovingVisibility& scene, std::size_t number, Counts& counts) {
   std::uint64_t* stale = stale_.data() + number * words_;
   PackedLight* light = light_.data() + number * lights_.size();
-  bool any = false;
+  Record& record = record_[number];
+  bool any = record.hollow;
   for (std::size_t k = 0; k < lights_.size(); ++k) {
-    if (!(stale[k / 64] >> k % 64 & 1u)) continue;
-    light[k] = look(scene, record_[number], lights_[k], counts);
+    if (!record.hollow && !(stale[k / 64] >> k % 64 & 1u)) continue;
+    light[k] = look(scene, record, lights_[k], counts);
     any = true;
   }
   std::fill(stale, stale + words_, 0);
+  record.hollow = false;
   if (any) sum(number);
 }
 
@@ -224,6 +234,7 @@ void InstantCache::refresh_all(const MovingVisibility& scene, InstantCacheReport
     if (record_[r].alive) all.push_back(r);
   }
   refresh(scene, all, report);
+  indexed_ = false;
 }
 
 std::uint32_t InstantCache::new_number(const BodyPlace& place, const MovingVisibility& scene) {

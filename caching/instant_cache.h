@@ -24,7 +24,7 @@ struct InstantCacheOptions {
   bool fade = true;      ///< weights less 1/a, so that records do not end in a step
   double least_distance = 0.1;  ///< min_d of equation 2, local units
   int oldest = 60;              ///< frames without use after which a record is dropped, >= 0
-  bool carry = true;            ///< records on bodies that move go with them; else are dropped
+  bool carry = false;           ///< records on bodies that move go with them; else are dropped
   bool on_demand = true;        ///< rays are traced anew when their record is used; else at once
 };
 
@@ -74,6 +74,7 @@ class InstantCache {
     double lost = 0;  ///< share of the light that the bound of equation 2 took, when it was made
     int used = 0;     ///< frame in which it was last used
     bool alive = false;
+    bool hollow = false;  ///< all its rays wait: a place where a record may be
   };
   std::span<const Record> records() const { return record_; }
   std::size_t alive() const { return record_.size() - free_.size(); }
@@ -106,8 +107,13 @@ class InstantCache {
   std::uint32_t new_number(const BodyPlace& place, const MovingVisibility& scene);
   void drop(std::size_t number);
   RecordIndex::Entry entry(std::uint32_t number) const;
-  bool covered(const SurfacePoint& point) const;
-  std::vector<std::uint32_t> cover(const MovingVisibility& scene, std::span<const SurfaceRow> rows);
+  bool covered(const Vec3& position, const Vec3& normal) const;
+  std::uint32_t hollow_near(const NearbyOctree& hollow, const SurfacePoint& point) const;
+  struct Cover {
+    std::vector<std::uint32_t> made, kept;
+  };
+  Cover cover(const MovingVisibility& scene, std::span<const SurfaceRow> rows);
+  void drop_surplus(InstantCacheReport& report);
   void use(std::uint32_t number);
   NearbyOctree empty_octree() const { return {2, options_.radius * options_.unit}; }
 
@@ -121,9 +127,9 @@ class InstantCache {
   std::vector<std::uint32_t> free_;   // numbers that are not alive, those to take first last
   std::size_t words_ = 0;
   int frame_ = 0;      // counts updates
-  RecordIndex index_;  // of all that are alive, where indexed_
+  RecordIndex index_;  // of all that are alive and not hollow, where indexed_
   bool indexed_ = false;
-  NearbyOctree fresh_;                       // those that this picture has made
+  NearbyOctree fresh_;                       // those that this picture has made or kept
   std::vector<std::vector<RecordSum>> sum_;  // by row and point of this picture
 };
 

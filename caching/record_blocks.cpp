@@ -54,7 +54,6 @@ __attribute__((target("avx2"))) void add_records_avx2(std::span<const RecordBloc
       any_near = _mm256_or_ps(any_near, _mm256_cmp_ps(q, near, _CMP_LT_OQ));
       __m256 w = _mm256_sub_ps(_mm256_div_ps(one, _mm256_max_ps(q, least_distance)), less);
       w = _mm256_and_ps(_mm256_max_ps(w, least_weight), inside);
-      w = _mm256_mul_ps(w, _mm256_load_ps(block.counts.data()));
       for (std::size_t c = 0; c < 3; ++c) {
         sum[c] = _mm256_add_ps(sum[c], _mm256_mul_ps(w, _mm256_load_ps(block.light[c].data())));
       }
@@ -102,8 +101,7 @@ void add_records_portable(std::span<const RecordBlock* const> blocks,
         if (!(q < reach.far)) continue;
         used[b] = static_cast<std::uint8_t>(used[b] | 1u << i);
         near = near || q < reach.near;
-        const float w =
-            std::max(1 / std::max(q, kLeastDistance) - reach.least, kLeastWeight) * block.counts[i];
+        const float w = std::max(1 / std::max(q, kLeastDistance) - reach.least, kLeastWeight);
         for (std::size_t c = 0; c < 3; ++c) sum[c][i] += w * block.light[c][i];
         sum[3][i] += w;
       }

@@ -36,16 +36,9 @@ struct SurfaceBox {
 struct alignas(32) RecordBlock {
   static constexpr float kNowhere = 1e15f;
   std::array<std::array<float, 8>, 6> at{};     ///< of SurfaceCoordinates, without the zeros
-  std::array<std::array<float, 8>, 3> light{};  ///< irradiance; 0 where it does not count
-  std::array<float, 8> counts{};                ///< 1, or 0: looked for, but not summed
+  std::array<std::array<float, 8>, 3> light{};  ///< irradiance
   std::array<std::uint32_t, 8> number{};
   std::uint32_t size = 0;
-};
-
-/// What a record adds to a sum.
-struct RecordShare {
-  Rgb irradiance;
-  bool counts = true;  ///< false: it is found, but adds nothing yet
 };
 
 /// Made of all records at once; halves of about equal number at each level, however many lie in one
@@ -59,15 +52,13 @@ class RecordIndex {
 
   void build(std::vector<Entry> entries);
   bool empty() const { return block_.empty(); }
-  /// Asks `share` for what each record adds, by its number.
-  template <typename Share>
-  void set_light(const Share& share) {
+  /// Asks `light` for each record's irradiance, by its number.
+  template <typename Light>
+  void set_light(const Light& light) {
     for (RecordBlock& block : block_) {
       for (std::size_t i = 0; i < block.size; ++i) {
-        const RecordShare s = share(block.number[i]);
-        const float on = s.counts ? 1 : 0;
-        block.light[0][i] = on * s.irradiance.r, block.light[1][i] = on * s.irradiance.g;
-        block.light[2][i] = on * s.irradiance.b, block.counts[i] = on;
+        const Rgb e = light(block.number[i]);
+        block.light[0][i] = e.r, block.light[1][i] = e.g, block.light[2][i] = e.b;
       }
     }
   }

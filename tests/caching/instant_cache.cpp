@@ -90,6 +90,42 @@ TEST(InstantCache, AfterAnyEditsEqualsOneFromScratch) {
   }
 }
 
+TEST(InstantCache, RecordsAreNoCloserThanHalfTheSpacing) {
+  // A new record is a spacing from all others; a hollow one that is filled lies within half a
+  // spacing of a place that is.
+  InstantCacheOptions options = options_with(true, true);
+  options.radius = 0.2;
+  EditedScene scene(7);
+  MovingVisibility visibility(scene.body());
+  InstantCache cache(options);
+  InstantCacheReport all;
+  std::vector<std::vector<RgbD>> irradiance;
+  std::size_t pairs = 0;
+  for (int e = 0; e < 80; ++e) {
+    visibility.next(scene.frame());
+    cache.update(visibility, virtual_lights(visibility, {16, 3, 1}), all);
+    Image picture;
+    cache.gather(visibility, points_of(visibility, picture), irradiance, all);
+    const auto records = cache.records();
+    for (std::size_t a = 0; a < records.size(); ++a) {
+      if (!records[a].alive || records[a].hollow) continue;
+      for (std::size_t b = 0; b < a; ++b) {
+        if (!records[b].alive || records[b].hollow) continue;
+        const double q = length(records[a].position - records[b].position) / options.unit +
+                         std::sqrt(std::max(1 - dot(records[a].normal, records[b].normal), 0.0));
+        // In single precision, where the root of what is rounded to 2^-23 is 3e-4.
+        ASSERT_GT(q, 0.5 * options.spacing * options.radius - 1e-3);
+        ++pairs;
+      }
+    }
+    scene.edit();
+  }
+  EXPECT_GT(pairs, 10000u);
+  // Both kinds were met: hollow ones that were filled, and that were in the way.
+  EXPECT_GT(all.records_updated, 100);
+  EXPECT_GT(all.records_dropped, 20);
+}
+
 TEST(InstantCache, PartsSeeWhatTheWholeSees) {
   // Single rays through what rests and what moves, against one Embree scene of everything in the
   // same local coordinates, and that without any motion in between.
