@@ -12,7 +12,7 @@ function(haarlight_hard_test group)
     GTest::gtest_main)
   target_include_directories(test_hard_${group} PRIVATE ${PROJECT_SOURCE_DIR})
   gtest_discover_tests(test_hard_${group} DISCOVERY_TIMEOUT 60 XML_OUTPUT_DIR ${HARD_CASES_FOLDER}
-    PROPERTIES LABELS hard TIMEOUT 600 FIXTURES_SETUP hard_cases
+    PROPERTIES LABELS hard TIMEOUT ${HAARLIGHT_TEST_TIMEOUT} FIXTURES_SETUP hard_cases
     ENVIRONMENT ${HAARLIGHT_TEST_ENVIRONMENT})
 endfunction()
 
