@@ -1,7 +1,8 @@
 # Installs a build into an empty prefix, builds the example against that alone, and compares what
 # the example draws with what the installed program draws.
 #
-#   cmake -D BUILD=DIR -D EXAMPLE=DIR -D WORK=DIR -D CXX=COMPILER -P install_test.cmake
+#   cmake -D BUILD=DIR -D EXAMPLE=DIR -D WORK=DIR -D CXX=COMPILER -D SANITIZE=NAMES
+#     -P install_test.cmake
 
 function(run)
   execute_process(COMMAND ${ARGV} RESULT_VARIABLE result OUTPUT_VARIABLE output
@@ -33,7 +34,10 @@ foreach(file ${texts})
   endif()
 endforeach()
 
-run(${CMAKE_COMMAND} -S ${EXAMPLE} -B ${WORK}/example -G Ninja -DCMAKE_BUILD_TYPE=Release
+if(SANITIZE)
+  set(flags -DCMAKE_CXX_FLAGS=-fsanitize=${SANITIZE})
+endif()
+run(${CMAKE_COMMAND} -S ${EXAMPLE} -B ${WORK}/example -G Ninja -DCMAKE_BUILD_TYPE=Release ${flags}
   -DCMAKE_CXX_COMPILER=${CXX} -DCMAKE_PREFIX_PATH=${prefix}
   -DCMAKE_FIND_PACKAGE_NO_PACKAGE_REGISTRY=ON)
 run(${CMAKE_COMMAND} --build ${WORK}/example)

@@ -5,6 +5,7 @@ add_test(NAME Install.ExampleBuildsAndAgreesWithTheProgram
     -D EXAMPLE=${PROJECT_SOURCE_DIR}/examples/relight_minimal
     -D WORK=${CMAKE_BINARY_DIR}/install_test
     -D CXX=${CMAKE_CXX_COMPILER}
+    -D SANITIZE=${HAARLIGHT_SANITIZE}
     -P ${CMAKE_CURRENT_LIST_DIR}/install_test.cmake)
 set_tests_properties(Install.ExampleBuildsAndAgreesWithTheProgram PROPERTIES
-  LABELS install TIMEOUT 300)
+  LABELS install TIMEOUT ${HAARLIGHT_TEST_TIMEOUT})
