@@ -76,6 +76,11 @@ class MovingVisibility {
   /// are free, but not bit by bit what occluded() says of rays that graze an edge.
   unsigned occluded8(const std::array<float, 3>& origin, const float* x, const float* y,
                      const float* z, unsigned lanes) const;
+  /// Eight rays of their own origins, as Visibility has them.
+  void first_hits8(Visibility::Rays8& rays, Visibility::Hits8& hits, bool coherent) const {
+    if (rest_) rest_->first_hits8(rays, hits, coherent);
+    if (moving_) moving_->first_hits8(rays, hits, coherent);
+  }
 
  private:
   using Part = std::unique_ptr<Visibility>;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -88,7 +89,28 @@ class Tile {
   };
 
   void meet() {
-    for (const Ray& ray : now_) shade(ray, scene_.first_hit(ray.from, ray.way));
+    Visibility::Rays8 rays;
+    Visibility::Hits8 hits;
+    for (std::size_t begin = 0; begin < now_.size(); begin += 8) {
+      const std::size_t count = std::min<std::size_t>(8, now_.size() - begin);
+      for (std::size_t i = 0; i < count; ++i) {
+        const Ray& ray = now_[begin + i];
+        rays.set(i, floats(ray.from), ray.way, std::numeric_limits<double>::infinity());
+      }
+      rays.lanes = (1u << count) - 1;
+      hits.found = 0;
+      scene_.first_hits8(rays, hits, now_[begin].mirrors == 0);
+      for (std::size_t i = 0; i < count; ++i) {
+        const Ray& ray = now_[begin + i];
+        std::optional<Visibility::Hit> hit;
+        if (dot(ray.from, ray.from) > kFarOff * kFarOff) {
+          hit = scene_.first_hit(ray.from, ray.way);
+        } else if (hits.found >> i & 1u) {
+          hit = hits.hit(i, rays);
+        }
+        shade(ray, hit);
+      }
+    }
   }
 
   void shade(const Ray& ray, const std::optional<Visibility::Hit>& hit) {

@@ -98,6 +98,12 @@ void occluded_eight(const int* valid, RTCScene scene, RTCRay8* ray) {
   rtcOccluded8(valid, scene, ray, &arguments);
 }
 void intersect_one(RTCScene scene, RTCRayHit* ray) { rtcIntersect1(scene, ray, nullptr); }
+void intersect_eight(const int* valid, RTCScene scene, RTCRayHit8* ray, bool coherent) {
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  arguments.flags = coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
+  rtcIntersect8(valid, scene, ray, &arguments);
+}
 #else
 RTCIntersectContext incoherent() {
   RTCIntersectContext context;
@@ -116,6 +122,13 @@ void occluded_eight(const int* valid, RTCScene scene, RTCRay8* ray) {
 void intersect_one(RTCScene scene, RTCRayHit* ray) {
   RTCIntersectContext context = incoherent();
   rtcIntersect1(scene, &context, ray);
+}
+void intersect_eight(const int* valid, RTCScene scene, RTCRayHit8* ray, bool coherent) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags =
+      coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+  rtcIntersect8(valid, scene, &context, ray);
 }
 #endif
 
@@ -410,6 +423,35 @@ unsigned Visibility::trace8(const std::array<float, 3>& origin, const float* x, 
     blocked |= static_cast<unsigned>(ray.tfar[i] < 0) << i;  // Embree writes -infinity when blocked
   }
   return blocked & lanes;
+}
+
+void Visibility::first_hits8(Rays8& rays, Hits8& hits, bool coherent) const {
+  RTCRayHit8 ray;
+  alignas(32) int valid[8];
+  std::memcpy(ray.ray.org_x, rays.origin[0].data(), sizeof ray.ray.org_x);
+  std::memcpy(ray.ray.org_y, rays.origin[1].data(), sizeof ray.ray.org_y);
+  std::memcpy(ray.ray.org_z, rays.origin[2].data(), sizeof ray.ray.org_z);
+  std::memcpy(ray.ray.dir_x, rays.direction[0].data(), sizeof ray.ray.dir_x);
+  std::memcpy(ray.ray.dir_y, rays.direction[1].data(), sizeof ray.ray.dir_y);
+  std::memcpy(ray.ray.dir_z, rays.direction[2].data(), sizeof ray.ray.dir_z);
+  std::memcpy(ray.ray.tfar, rays.length.data(), sizeof ray.ray.tfar);
+  for (unsigned i = 0; i < 8; ++i) {
+    valid[i] = (rays.lanes >> i & 1u) ? -1 : 0;
+    ray.ray.tnear[i] = ray.ray.time[i] = 0;
+    ray.ray.mask[i] = kAll;
+    ray.ray.id[i] = i, ray.ray.flags[i] = 0;
+    ray.hit.geomID[i] = ray.hit.primID[i] = RTC_INVALID_GEOMETRY_ID;
+    ray.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+  }
+  intersect_eight(valid, device_->scene, &ray, coherent);
+  for (unsigned i = 0; i < 8; ++i) {
+    if (!(rays.lanes >> i & 1u) || ray.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
+    const std::uint32_t place = device_->first[ray.hit.geomID[i]] + ray.hit.primID[i];
+    hits.triangle[i] = device_->triangle_at.empty() ? place : device_->triangle_at[place];
+    hits.b1[i] = ray.hit.u[i], hits.b2[i] = ray.hit.v[i];
+    rays.length[i] = ray.ray.tfar[i];
+    hits.found |= 1u << i;
+  }
 }
 
 std::array<Vec3, 3> Visibility::corners(std::uint32_t triangle) const {

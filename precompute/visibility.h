@@ -85,6 +85,34 @@ class Visibility {
   unsigned occluded8_segments(const std::array<float, 3>& origin, const float* x, const float* y,
                               const float* z, unsigned lanes, Surfaces seen = kAll) const;
 
+  /// Eight rays, each from its own origin (local, within 1e4 of the middle) as far as its length.
+  struct Rays8 {
+    alignas(32) std::array<std::array<float, 8>, 3> origin{};
+    alignas(32) std::array<std::array<float, 8>, 3> direction{};  ///< unit
+    alignas(32) std::array<float, 8> length{};
+    unsigned lanes = 0;  ///< bit i: ray i is one
+
+    void set(std::size_t i, const std::array<float, 3>& from, const Vec3& way, double size) {
+      for (std::size_t a = 0; a < 3; ++a) origin[a][i] = from[a];
+      direction[0][i] = static_cast<float>(way.x), direction[1][i] = static_cast<float>(way.y);
+      direction[2][i] = static_cast<float>(way.z), length[i] = static_cast<float>(size);
+    }
+  };
+  struct Hits8 {
+    std::array<std::uint32_t, 8> triangle{};
+    std::array<float, 8> b1{}, b2{};
+    unsigned found = 0;  ///< bit i: ray i has met triangle[i] at its length
+
+    Hit hit(std::size_t i, const Rays8& rays) const {
+      return {triangle[i], static_cast<double>(b1[i]), static_cast<double>(b2[i]),
+              static_cast<double>(rays.length[i])};
+    }
+  };
+  /// Nearest triangles of eight rays: writes those that are found, ends the rays there, and leaves
+  /// the others as they were, so that several parts of a scene can be asked in turn. Faster than
+  /// first_hit() where the rays lie close together (`coherent`), but not always the same last bits.
+  void first_hits8(Rays8& rays, Hits8& hits, bool coherent) const;
+
   std::size_t triangle_count() const { return triangle_count_; }
   /// Whether any triangle is seen by kSpecular rays; by kGlossy rays; has an alpha cutoff.
   bool has_specular() const { return has_specular_; }

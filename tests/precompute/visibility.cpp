@@ -6,6 +6,7 @@
 
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "core/error.h"
@@ -69,6 +70,59 @@ TEST(Visibility, AgreesWithBruteForce) {
 
 // Rays that leave a convex body never meet it again: 0 in a million, near and far from the origin,
 // with triangles of all sizes.
+TEST(Visibility, EightRaysMeetWhatOneMeets) {
+  // Through both parts of a scene in turn, with lanes that are none, of three kinds of material.
+  std::mt19937 random(9);
+  Scene scene = shapes::empty_scene();
+  scene.material.resize(3);
+  scene.material[1].model = SurfaceModel::glass;
+  scene.material[2].model = SurfaceModel::metallic_roughness;
+  for (int i = 0; i < 60; ++i) {
+    const Vec3 p = shapes::random_direction(random) * (0.2 * (i % 5));
+    shapes::add_quad(scene, p, shapes::random_direction(random) * 0.4,
+                     shapes::random_direction(random) * 0.4, static_cast<std::uint32_t>(i % 3));
+  }
+  const Visibility::LocalFrame frame = Visibility::local_frame(scene);
+  std::vector<std::uint32_t> even, odd;
+  for (std::uint32_t t = 0; t < scene.triangle.size(); ++t) (t % 2 == 0 ? even : odd).push_back(t);
+  const Visibility whole(scene), first(scene, frame, even), second(scene, frame, odd);
+  int found = 0, missed = 0, differ = 0;
+  for (int n = 0; n < 2000; ++n) {
+    Visibility::Rays8 rays;
+    Visibility::Hits8 hits;
+    rays.lanes = static_cast<unsigned>(random()) & 255u;
+    std::array<Vec3, 8> from, way;
+    for (std::size_t i = 0; i < 8; ++i) {
+      from[i] = shapes::random_direction(random) * 0.9;
+      way[i] = normalize(shapes::random_direction(random) * 0.5 - from[i]);
+      rays.set(i, to_float(from[i]), way[i], std::numeric_limits<double>::infinity());
+    }
+    for (const Visibility* part : {&first, &second}) part->first_hits8(rays, hits, n % 2 == 0);
+    ASSERT_EQ(hits.found & ~rays.lanes, 0u);
+    for (std::size_t i = 0; i < 8; ++i) {
+      if (!(rays.lanes >> i & 1u)) continue;
+      const auto one = whole.first_hit(to_vec(to_float(from[i])), way[i]);
+      const bool meets = (hits.found >> i & 1u) != 0;
+      ++(meets ? found : missed);
+      if (one.has_value() != meets) {
+        ++differ;  // grazes an edge
+        continue;
+      }
+      if (!one) continue;
+      const Visibility::Hit eight = hits.hit(i, rays);
+      differ += eight.triangle != one->triangle;
+      if (eight.triangle != one->triangle) continue;
+      // Floats of coordinates below 2, in another order.
+      EXPECT_NEAR(eight.distance, one->distance, 1e-4);
+      EXPECT_NEAR(eight.b1, one->b1, 1e-3);
+      EXPECT_NEAR(eight.b2, one->b2, 1e-3);
+    }
+  }
+  EXPECT_GT(found, 2000);
+  EXPECT_GT(missed, 500);
+  EXPECT_LT(differ, 8);
+}
+
 TEST(Visibility, ConvexBodiesDoNotShadowThemselves) {
   Scene sphere = shapes::empty_scene();
   shapes::add_sphere(sphere, {0.1, 0.2, 0.3}, 0.7, 6);
