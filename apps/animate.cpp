@@ -65,6 +65,7 @@ std::unique_ptr<AnimationMethod> AnimateCommand::make(const AnimatedScene& anima
   }
   InstantOptions options = instant;
   options.width = picture.width, options.height = picture.height;
+  options.show_life = caching.show_life;
   options.kind = method == "direct" ? InstantKind::direct
                  : method == "igi"  ? InstantKind::igi
                  : method == "ic"   ? InstantKind::ic

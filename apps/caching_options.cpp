@@ -32,7 +32,8 @@ void add_caching_options(CLI::App& verb, CachingOptions& options) {
   add_integer(verb, "--max-lifespan", o.age.longest, 1, 100000,
               "trc: frames after which a record is replaced anyhow");
   verb.add_flag("--show-life", o.show_life,
-                "trc: also life_0000.png, ...: records that last long green, short ones red");
+                "irc, trc: also life_0000.png, ...: records that last long green, short ones red; "
+                "ic, tic: records that have been good for 16 frames green, new ones red");
   add_integer(verb, "--check", o.check, 0, 1 << 20,
               "irc, trc: so many records a frame are sampled anew, untimed, for the columns "
               "accuracy, reprojection_error and still_error");

@@ -125,6 +125,7 @@ void InstantCache::update(const MovingVisibility& scene, std::vector<VirtualLigh
         const auto r = static_cast<std::size_t>(i);
         if (!record_[r].alive) return;
         const bool before = record_[r].hollow;
+        record_[r].kept += 1;
         if (go_on(scene, r, counts[r])) sum(r);
         emptied[r] = record_[r].hollow != before;
       },
@@ -154,6 +155,7 @@ bool InstantCache::go_on(const MovingVisibility& scene, std::size_t number, Coun
     return false;
   }
   bool any = false;
+  std::size_t anew = 0;
   for (std::size_t k = 0; k < lights_.size(); ++k) {
     const std::uint64_t bit = std::uint64_t{1} << k % 64;
     if (stale[k / 64] & bit) continue;  // nothing is known that could change
@@ -197,8 +199,15 @@ bool InstantCache::go_on(const MovingVisibility& scene, std::size_t number, Coun
     if (now == light[k]) continue;
     light[k] = now;
     any = counts.updated = true;
+    ++anew;
   }
+  look_at(record, anew);
   return any;
+}
+
+// So many of its lights are not what they were.
+void InstantCache::look_at(Record& record, std::size_t anew) const {
+  record.kept *= 1 - static_cast<float>(anew) / static_cast<float>(lights_.size());
 }
 
 void InstantCache::refresh(const MovingVisibility& scene, std::size_t number, Counts& counts) {
@@ -206,13 +215,15 @@ void InstantCache::refresh(const MovingVisibility& scene, std::size_t number, Co
   PackedLight* light = light_.data() + number * lights_.size();
   Record& record = record_[number];
   bool any = record.hollow;
+  std::size_t anew = 0;
   for (std::size_t k = 0; k < lights_.size(); ++k) {
     if (!record.hollow && !(stale[k / 64] >> k % 64 & 1u)) continue;
     light[k] = look(scene, record, lights_[k], counts);
-    any = true;
+    any = true, ++anew;
   }
   std::fill(stale, stale + words_, 0);
   record.hollow = false;
+  look_at(record, anew);
   if (any) sum(number);
 }
 

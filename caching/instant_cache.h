@@ -66,6 +66,11 @@ class InstantCache {
   void gather(const MovingVisibility& scene, std::span<const SurfaceRow> rows,
               std::vector<std::vector<RgbD>>& irradiance, InstantCacheReport& report);
 
+  /// After gather(): Record::kept of the records that light each point, the mean by their weights,
+  /// at most `most`; -1 where there are none. In the order of `rows`.
+  void kept_for(std::span<const SurfaceRow> rows, int most,
+                std::vector<std::vector<float>>& frames) const;
+
   /// A record as it stands. Those that are not alive are places for new ones.
   struct Record {
     BodyPlace place;
@@ -73,6 +78,7 @@ class InstantCache {
     RgbD irradiance;                          ///< W/m^2; sum of its lights
     double lost = 0;  ///< share of the light that the bound of equation 2 took, when it was made
     int used = 0;     ///< frame in which it was last used
+    float kept = 0;   ///< for how many frames its lights have been as they are, their mean
     bool alive = false;
     bool hollow = false;  ///< all its rays wait: a place where a record may be
   };
@@ -103,6 +109,7 @@ class InstantCache {
   void refresh(const MovingVisibility& scene, std::size_t number, Counts& counts);
   void refresh(const MovingVisibility& scene, std::span<const std::uint32_t> numbers,
                InstantCacheReport& report);
+  void look_at(Record& record, std::size_t anew) const;
   void sum(std::size_t number);
   std::uint32_t new_number(const BodyPlace& place, const MovingVisibility& scene);
   void drop(std::size_t number);
@@ -115,6 +122,7 @@ class InstantCache {
   Cover cover(const MovingVisibility& scene, std::span<const SurfaceRow> rows);
   void drop_surplus(InstantCacheReport& report);
   void use(std::uint32_t number);
+  RecordReach reach() const;
   NearbyOctree empty_octree() const { return {2, options_.radius * options_.unit}; }
 
   InstantCacheOptions options_;

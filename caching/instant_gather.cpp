@@ -141,18 +141,44 @@ void InstantCache::drop_surplus(InstantCacheReport& report) {
   }
 }
 
+RecordReach InstantCache::reach() const {
+  return {static_cast<float>(options_.radius),
+          static_cast<float>(options_.spacing * options_.radius),
+          options_.fade ? static_cast<float>(1 / options_.radius) : 0.0f};
+}
+
+void InstantCache::kept_for(std::span<const SurfaceRow> rows, int most,
+                            std::vector<std::vector<float>>& frames) const {
+  std::vector<RecordIndex::Entry> entries;
+  for (std::uint32_t r = 0; r < record_.size(); ++r) {
+    if (record_[r].alive && !record_[r].hollow) entries.push_back(entry(r));
+  }
+  RecordIndex index;
+  index.build(std::move(entries));
+  index.set_light([&](std::uint32_t r) {
+    const float kept = std::min(record_[r].kept, static_cast<float>(most));
+    return Rgb{kept, kept, kept};
+  });
+  std::vector<std::vector<RecordSum>> sum(rows.size());
+  for (std::size_t y = 0; y < rows.size(); ++y) sum[y].resize(rows[y].point.size());
+  add_patches(
+      index, rows, 1 / options_.unit, reach(), [](std::uint32_t) {}, sum);
+  frames.resize(rows.size());
+  for (std::size_t y = 0; y < rows.size(); ++y) {
+    frames[y].clear();
+    for (const RecordSum& s : sum[y]) frames[y].push_back(s.weight > 0 ? s.r / s.weight : -1);
+  }
+}
+
 void InstantCache::gather(const MovingVisibility& scene, std::span<const SurfaceRow> rows,
                           std::vector<std::vector<RgbD>>& irradiance_of,
                           InstantCacheReport& report) {
   sum_.resize(rows.size());
   for (std::size_t y = 0; y < rows.size(); ++y) sum_[y].assign(rows[y].point.size(), {});
   const double per_unit = 1 / options_.unit;
-  const RecordReach reach{static_cast<float>(options_.radius),
-                          static_cast<float>(options_.spacing * options_.radius),
-                          options_.fade ? static_cast<float>(1 / options_.radius) : 0.0f};
   const auto add = [&](const RecordIndex& index) {
     add_patches(
-        index, rows, per_unit, reach, [&](std::uint32_t r) { use(r); }, sum_);
+        index, rows, per_unit, reach(), [&](std::uint32_t r) { use(r); }, sum_);
   };
   const auto light = [&](std::uint32_t r) { return Rgb(record_[r].irradiance); };
   const auto index_of = [&](const std::vector<std::uint32_t>& numbers) {

@@ -52,6 +52,30 @@ FramePicture InstantMethod::frame(int number, const Progress& progress) {
   return out;
 }
 
+// Red where all light was looked at in this frame, green where it has been good for kLong.
+Image InstantMethod::life() const {
+  constexpr int kLong = 16;
+  std::vector<std::vector<float>> frames;
+  cache_.kept_for(rows_, kLong, frames);
+  Image life(options_.width, options_.height);
+  for (int y = 0; y < options_.height; ++y) {
+    const SurfaceRow& row = rows_[static_cast<std::size_t>(y)];
+    for (int x = 0; x < options_.width; ++x) {
+      const auto at = static_cast<std::size_t>(x);
+      double sum = 0, weights = 0;
+      for (std::size_t i = row.first[at]; i < row.first[at + 1]; ++i) {
+        const auto kept = static_cast<double>(frames[static_cast<std::size_t>(y)][i]);
+        const double w = kept < 0 ? 0 : luminance(row.point[i].weight);
+        sum += w * kept, weights += w;
+      }
+      if (!(weights > 0)) continue;
+      const auto share = static_cast<float>(sum / weights / kLong);
+      life.at(x, y) = {1 - share, share, 0.1f};
+    }
+  }
+  return life;
+}
+
 FramePicture InstantMethod::draw(AnimatedFrame next, const Progress& progress) {
   const auto stop_if_told = [&](double share) {
     if (progress && !progress(share)) throw Error(ErrorKind::cancelled, "stopped");
@@ -110,6 +134,8 @@ FramePicture InstantMethod::draw(AnimatedFrame next, const Progress& progress) {
     });
   }
   const double gather_ms = watch.lap();
+  const bool records = options_.kind == InstantKind::ic || options_.kind == InstantKind::tic;
+  if (options_.show_life && records) out.extra.push_back({"life", life()});
   std::size_t alive = 0;
   for (const InstantCache::Record& record : cache_.records()) {
     if (record.alive) bounded += record.lost, ++alive;

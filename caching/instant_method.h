@@ -29,6 +29,7 @@ struct InstantOptions {
   InstantCacheOptions cache;    ///< all but its lengths
   int pattern = 3;              ///< InterleavedOptions::pattern
   SurfacePointOptions points;
+  bool show_life = false;  ///< ic, tic: an extra picture: frames that records have been good for
 };
 
 /// Direct light and lobes as surface_points() has them, indirect light by virtual lights: paths of
@@ -42,8 +43,12 @@ class InstantMethod : public AnimationMethod {
   FramePicture frame(int number, const Progress& progress) override;
   /// A frame of the scene as it stands, whatever was drawn before: nothing need be known of it.
   FramePicture draw(AnimatedFrame frame, const Progress& progress);
+  /// Of the pictures to come. Records stay.
+  void set_size(int width, int height) { options_.width = width, options_.height = height; }
+  void show_life(bool on) { options_.show_life = on; }
 
  private:
+  Image life() const;
   const AnimatedScene& scene_;
   InstantOptions options_;
   MovingVisibility visibility_;

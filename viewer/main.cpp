@@ -10,6 +10,7 @@
 #include <exception>
 #include <map>
 #include <new>
+#include <optional>
 #include <string>
 
 #include "core/error.h"
@@ -64,6 +65,7 @@ struct CommandLine {
   std::string exposure = "auto", tonemap = "filmic", size, picture;
   int threads = 0;
   SceneRunOptions scene;  // what a scene that moves needs beside that
+  std::optional<double> least_rate;
 };
 
 void add_options(CLI::App& app, CommandLine& c) {
@@ -141,6 +143,12 @@ void add_options(CLI::App& app, CommandLine& c) {
   app.add_option("--spp", c.scene.settings.samples, "path: paths a pixel in one picture [1]")
       ->check(CLI::Range(1, 4096));
   app.add_option("--picture", c.picture, "of a scene that moves, WIDTHxHEIGHT [600x400]");
+  app.add_flag("--show-life", c.scene.settings.show_life,
+               "of a scene that moves: records coloured by their life, red to green");
+  app.add_option("--least-rate", c.least_rate,
+                 "pictures a second below which a scene that moves is drawn with fewer pixels "
+                 "until it rests; 0: never [5; with --frames 0]")
+      ->check(CLI::Range(0.0, 1000.0));
   app.add_option("--first", c.scene.settings.first, "frame that a scene begins with [0]")
       ->check(CLI::Range(0, 1'000'000));
   app.add_option("--pause-at", c.scene.pause_at,
@@ -195,6 +203,7 @@ void finish_options(CommandLine& c) {
   SceneRunOptions& s = c.scene;
   read_size("--picture", c.picture, s.settings.width, s.settings.height);
   s.settings.env = r.env;
+  s.settings.least_rate = c.least_rate.value_or(r.frames > 0 ? 0 : 5);
   s.scene = r.transport, s.frames = r.frames;
   s.exposure_ev = r.exposure_ev, s.curve = r.curve;
   s.screenshot = r.screenshot, s.exr = r.exr, s.metrics = r.metrics;

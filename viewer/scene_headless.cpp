@@ -38,7 +38,11 @@ void run_scene_headless(const SceneRunOptions& options) {
   if (!options.exr.empty()) save_image(options.exr, session.picture());
   if (options.screenshot.empty()) return;
   const double exposure = options.exposure_ev.value_or(auto_exposure_ev(session.picture()));
-  save_image(options.screenshot, tonemap(session.picture(), {options.curve, exposure}));
+  if (session.shows_life() && !session.life().pixels.empty()) {
+    save_image(options.screenshot, session.life());
+  } else {
+    save_image(options.screenshot, tonemap(session.picture(), {options.curve, exposure}));
+  }
 }
 
 }  // namespace haarlight::viewer

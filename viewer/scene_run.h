@@ -29,7 +29,8 @@ void run_scene_headless(const SceneRunOptions& options);
 
 /// Opens a window of `width` x `height` and returns when it is closed, or after options.frames.
 /// Drag turns the camera, the wheel comes closer; with the right button, or Shift, what is under
-/// the pointer is dragged. Space plays, . and , step, M changes the method, + and - the exposure.
+/// the pointer is dragged. Space plays, . and , step, M changes the method, L shows the life of
+/// records, + and - change the exposure.
 /// Throws Error, in particular Error{missing} where there is no display or no OpenGL 3.3.
 void show_scene(const SceneRunOptions& options, int width, int height, double scale);
 

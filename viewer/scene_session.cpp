@@ -3,6 +3,7 @@
 #include "viewer/scene_session.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -37,6 +38,11 @@ void SceneSession::set_method(SceneMethod method) {
   method_.reset(), instant_.reset();
 }
 
+void SceneSession::show_life(bool on) {
+  changed_ = changed_ || on != settings_.show_life;
+  settings_.show_life = on;
+}
+
 void SceneSession::orbit(double turn, double rise, double closer) {
   view_.orbit += turn, view_.elevation += rise;
   view_.closer = std::clamp(view_.closer + closer, -6.0, 6.0);
@@ -53,7 +59,7 @@ void SceneSession::look() {
   tracer_.reset();
   scene_.set_camera({});
   now_ = std::make_unique<AnimatedFrame>(scene_.at(frame_));
-  camera_ = frame_camera(*now_, settings_.width, settings_.height);
+  camera_ = frame_camera(*now_, width(), height());
   if (!middle_) {
     const Visibility& visibility = tracer().visibility();
     const Vec3 way = camera_.direction(0.5 * camera_.width, 0.5 * camera_.height);
@@ -129,9 +135,9 @@ void SceneSession::drag(const Grab& grab, double x, double y) {
 
 // Adds to what there is.
 void SceneSession::draw_paths() {
-  if (changed_) samples_ = 0, sum_.clear();
+  if (changed_) samples_ = 0, sum_.clear(), life_ = {};
   PathPictureOptions options;
-  options.width = settings_.width, options.height = settings_.height;
+  options.width = width(), options.height = height();
   options.samples = settings_.samples;
   options.seed = static_cast<std::uint64_t>(samples_) + 1;
   const Image more = path_picture(tracer(), options);
@@ -144,40 +150,81 @@ void SceneSession::draw_paths() {
   }
 }
 
+void SceneSession::draw_virtual_lights() {
+  if (!instant_) {
+    InstantOptions options;
+    options.kind = settings_.method == SceneMethod::igi  ? InstantKind::igi
+                   : settings_.method == SceneMethod::ic ? InstantKind::ic
+                                                         : InstantKind::tic;
+    instant_ = std::make_unique<InstantMethod>(scene_, options);
+  }
+  instant_->set_size(width(), height());
+  instant_->show_life(settings_.show_life);
+  take(instant_->draw(*now_, {}));
+}
+
+// A cache goes on from frame to frame; what a hand has done it could not foresee.
+void SceneSession::draw_records() {
+  if (!method_ || touched_ || frame_ != drawn_ + 1) {
+    CachingOptions options;
+    options.width = settings_.width, options.height = settings_.height;
+    options.temporal = settings_.method == SceneMethod::trc;
+    options.gradients = TemporalGradients::extrapolated;
+    options.show_life = true;  // costs nothing beside the rest
+    method_ = std::make_unique<CachingMethod>(scene_, options);
+  }
+  take(method_->frame(frame_, {}));
+  drawn_ = frame_;
+}
+
+void SceneSession::take(FramePicture drawn) {
+  picture_ = std::move(drawn.radiance);
+  life_ = {};
+  if (settings_.show_life && !drawn.extra.empty()) life_ = std::move(drawn.extra[0].picture);
+  samples_ = 0;
+}
+
+// As large as keeps the rate while something moves, else in full.
+void SceneSession::choose_size(bool moves) {
+  const bool may = settings_.method == SceneMethod::path || is_instant();
+  if (!moves || !may || !(settings_.least_rate > 0)) {
+    coarse_ = 1;
+    return;
+  }
+  // A picture of four times the pixels takes less than four times as long.
+  constexpr double kFiner = 3.5;
+  const double time = seconds_ * settings_.least_rate;
+  if (time > 1 && coarse_ < kCoarsest) {
+    coarse_ *= 2;
+  } else if (time * kFiner < 1 && coarse_ > 1) {
+    coarse_ /= 2;
+  }
+}
+
 bool SceneSession::advance() {
+  using Clock = std::chrono::steady_clock;
   if (playing_ && begun_) {
     frame_ = (frame_ + 1) % frames_;
     changed_ = true;
   }
+  const bool moves = begun_ && (playing_ || touched_);
+  changed_ = changed_ || (coarse_ > 1 && !moves);  // in full, now that it rests
   const bool better = settings_.method == SceneMethod::path && samples_ < kMostSamples;
   if (!changed_ && !better) return false;
-  if (changed_) look();
+  if (changed_) {
+    choose_size(moves);
+    look();
+  }
+  const auto begin = Clock::now();
   if (settings_.method == SceneMethod::path) {
     draw_paths();
   } else if (is_instant()) {
-    if (!instant_) {
-      InstantOptions options;
-      options.width = settings_.width, options.height = settings_.height;
-      options.kind = settings_.method == SceneMethod::igi  ? InstantKind::igi
-                     : settings_.method == SceneMethod::ic ? InstantKind::ic
-                                                           : InstantKind::tic;
-      instant_ = std::make_unique<InstantMethod>(scene_, options);
-    }
-    picture_ = instant_->draw(*now_, {}).radiance;
-    samples_ = 0;
+    draw_virtual_lights();
   } else {
-    // A cache goes on from frame to frame; what a hand has done it could not foresee.
-    if (!method_ || touched_ || frame_ != drawn_ + 1) {
-      CachingOptions options;
-      options.width = settings_.width, options.height = settings_.height;
-      options.temporal = settings_.method == SceneMethod::trc;
-      options.gradients = TemporalGradients::extrapolated;
-      method_ = std::make_unique<CachingMethod>(scene_, options);
-    }
-    picture_ = method_->frame(frame_, {}).radiance;
-    drawn_ = frame_;
-    samples_ = 0;
+    draw_records();
   }
+  const std::chrono::duration<double> span = Clock::now() - begin;
+  seconds_ = span.count();
   changed_ = touched_ = false;
   begun_ = true;
   return true;

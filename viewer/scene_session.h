@@ -28,6 +28,10 @@ struct SceneSettings {
   int samples = 1;            ///< path: paths a pixel in one picture, >= 1
   int first = 0;              ///< frame that it begins with
   std::filesystem::path env;  ///< a picture behind everything in place of the scene's; empty: none
+  /// path, igi, ic, tic: where fewer pictures come a second while something moves they are half or
+  /// a quarter as wide and high, until all rests; 0: never.
+  double least_rate = 0;
+  bool show_life = false;  ///< irc, trc, ic, tic: records coloured by their life
 };
 
 /// Plays an animated scene. What is still is drawn better and better by `path`, and once by the
@@ -44,6 +48,9 @@ class SceneSession {
   /// So many frames on, or back, and stops. After the last frame comes the first.
   void step(int frames);
   void set_method(SceneMethod method);
+  /// Whether life() is drawn, too.
+  void show_life(bool on);
+  bool shows_life() const { return settings_.show_life; }
   SceneMethod method() const { return settings_.method; }
   /// Radians about +Y and up, and halvings of the distance, all about what is in the middle of the
   /// first picture, on top of the file's camera.
@@ -68,6 +75,10 @@ class SceneSession {
   bool advance();
 
   const Image& picture() const { return picture_; }  ///< radiance
+  /// Red where records are new, or end now, green where they last; display-referred. Empty unless
+  /// asked for and drawn by a method that has records.
+  const Image& life() const { return life_; }
+  int coarseness() const { return coarse_; }  ///< 1, or 2 or 4: how many times fewer pixels across
   int frame() const { return frame_; }
   int frames() const { return frames_; }
   int samples() const { return samples_; }  ///< paths a pixel in picture()
@@ -76,10 +87,17 @@ class SceneSession {
   std::vector<std::array<double, 2>> lamps_seen() const;
 
   static constexpr int kMostSamples = 4096;
+  static constexpr int kCoarsest = 4;
 
  private:
   void look();
   void draw_paths();
+  void draw_virtual_lights();
+  void draw_records();
+  void take(FramePicture drawn);
+  void choose_size(bool moves);
+  int width() const { return settings_.width / coarse_; }
+  int height() const { return settings_.height / coarse_; }
   bool is_instant() const { return settings_.method >= SceneMethod::igi; }
   const FrameTracer& tracer() const;
   std::optional<std::array<double, 2>> pixel_of(const Vec3& world) const;
@@ -98,7 +116,9 @@ class SceneSession {
   std::unique_ptr<InstantMethod> instant_;
   int drawn_ = -1;        // the last frame that method_ drew
   bool touched_ = false;  // since then something moved that no key says
-  Image picture_;
+  int coarse_ = 1;        // of the last picture
+  double seconds_ = 0;    // that it took
+  Image picture_, life_;
   std::vector<RgbD> sum_;
   int samples_ = 0;
 };

@@ -109,6 +109,7 @@ class SceneInterface {
         session_.set_method(
             static_cast<SceneMethod>((static_cast<int>(session_.method()) + 1) % kSceneMethods));
       }
+      if (ImGui::IsKeyPressed(GLFW_KEY_L, false)) session_.show_life(!session_.shows_life());
       for (const auto& [key, change] : {std::pair{GLFW_KEY_EQUAL, 0.25}, {GLFW_KEY_MINUS, -0.25}}) {
         if (!ImGui::IsKeyPressed(key)) continue;
         exposure_ += change, reshow = true;
@@ -153,6 +154,8 @@ class SceneInterface {
     if (ImGui::Combo("##method", &method, kMethods, kSceneMethods)) {
       session_.set_method(static_cast<SceneMethod>(method));
     }
+    bool life = session_.shows_life();
+    if (ImGui::Checkbox("life of records", &life)) session_.show_life(life);
     int frame = session_.frame();
     if (ImGui::SliderInt("frame", &frame, 0, std::max(session_.frames() - 1, 1))) {
       session_.step(frame - session_.frame());
@@ -162,7 +165,9 @@ class SceneInterface {
                                                session_.triangles(), session_.samples())
                                  : fmt::format("{} triangles", session_.triangles());
     ImGui::TextUnformatted(line.c_str());
-    ImGui::TextUnformatted(fmt::format("{:.1f} pictures a second", pictures_a_second).c_str());
+    ImGui::TextUnformatted(fmt::format("{:.1f} pictures a second, {} x {}", pictures_a_second,
+                                       session_.picture().width, session_.picture().height)
+                               .c_str());
     ImGui::TextDisabled("drag: turn; right drag: move body or lamp; wheel: closer");
     ImGui::End();
   }
@@ -197,9 +202,11 @@ void show_scene(const SceneRunOptions& options, int width, int height, double sc
       continue;
     }
     if (reshow) {
-      const Image& picture = session.picture();
+      const bool life = session.shows_life() && !session.life().pixels.empty();
+      const Image& picture = life ? session.life() : session.picture();
       texture.fill_rgba(picture.width, picture.height,
-                        bytes_of(picture, options.curve, interface.exposure()));
+                        life ? bytes_of(picture, TonemapCurve::linear, 0)
+                             : bytes_of(picture, options.curve, interface.exposure()));
     }
     window.begin_frame({});
     const Place place = place_of(session.picture());

@@ -216,6 +216,32 @@ TEST(InstantCache, NothingChangesNothingIsTraced) {
   EXPECT_TRUE(first == second);
 }
 
+TEST(InstantCache, TellsHowLongRecordsHaveBeenGood) {
+  EditedScene scene(2);
+  MovingVisibility visibility(scene.body());
+  InstantCache cache(options_with(true, false));
+  InstantCacheReport report;
+  std::vector<std::vector<RgbD>> irradiance;
+  std::vector<std::vector<float>> frames;
+  for (int e = 0; e < 8; ++e) {
+    visibility.next(scene.frame());
+    cache.update(visibility, virtual_lights(visibility, {32, 3, 1}), report);
+    Image picture;
+    const std::vector<SurfaceRow> rows = points_of(visibility, picture);
+    cache.gather(visibility, rows, irradiance, report);
+    cache.kept_for(rows, 5, frames);
+    std::size_t points = 0;
+    for (const auto& row : frames) {
+      for (const float f : row) {
+        // All were made in the first frame, and nothing has happened since.
+        ASSERT_NEAR(f, std::min(e, 5), 1e-4);
+        ++points;
+      }
+    }
+    EXPECT_GT(points, 200u);
+  }
+}
+
 TEST(InstantCache, SameBitsOnAnyNumberOfThreads) {
   const int before = thread_count();
   std::vector<std::vector<RgbD>> reference;

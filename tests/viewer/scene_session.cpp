@@ -188,6 +188,85 @@ TEST(SceneSession, VirtualLightsDrawTheSameSceneAndGoOnUnderAHand) {
   }
 }
 
+TEST(SceneSession, FewerPixelsWhileItPlaysAndAllAtRest) {
+  const auto file = scene_file("cube-in-box");
+  SceneSettings settings{48, 36, SceneMethod::igi, 1, 0, {}};
+  for (const SceneMethod method : {SceneMethod::igi, SceneMethod::path}) {
+    settings.method = method;
+    settings.least_rate = 0;
+    SceneSession whole(file, settings);
+    whole.step(6);
+    whole.advance();
+    settings.least_rate = 1e9;  // no machine draws that fast
+    SceneSession session(file, settings);
+    EXPECT_TRUE(session.advance());
+    EXPECT_EQ(session.picture().width, 48);
+    session.play(true);
+    for (const int coarse : {2, 4, 4}) {
+      EXPECT_TRUE(session.advance());
+      EXPECT_EQ(session.coarseness(), coarse);
+      EXPECT_EQ(session.picture().width, 48 / coarse);
+      EXPECT_EQ(session.picture().height, 36 / coarse);
+    }
+    // It may be dragged at; rings of lamps are where the picture shows them.
+    const auto lamps = session.lamps_seen();
+    ASSERT_EQ(lamps.size(), 1u);
+    EXPECT_LT(lamps[0][0], 12);
+    session.play(false);
+    EXPECT_TRUE(session.advance());
+    EXPECT_EQ(session.coarseness(), 1);
+    EXPECT_EQ(session.picture().width, 48);
+    session.step(3);
+    EXPECT_TRUE(session.advance());
+    EXPECT_EQ(session.frame(), 6);
+    EXPECT_EQ(session.picture().pixels, whole.picture().pixels);
+    session.orbit(0.1, 0, 0);
+    EXPECT_TRUE(session.advance());
+    EXPECT_EQ(session.coarseness(), 2);
+  }
+  settings.least_rate = 1e-9;  // any machine does
+  SceneSession session(file, settings);
+  session.play(true);
+  for (int i = 0; i < 3; ++i) session.advance();
+  EXPECT_EQ(session.coarseness(), 1);
+}
+
+TEST(SceneSession, ShowsTheLifeOfRecords) {
+  // Of the box of a cube that moves: at first all is new; later the walls, which it hardly changes,
+  // have been good for longer than the cube's own records.
+  SceneSettings settings{48, 36, SceneMethod::tic, 1, 0, {}};
+  SceneSession session(scene_file("cube-in-box"), settings);
+  session.advance();
+  EXPECT_TRUE(session.life().pixels.empty());
+  session.show_life(true);
+  const auto means = [&] {
+    Rgb sum;
+    for (const Rgb& c : session.life().pixels) {
+      sum += c * (1.0f / static_cast<float>(session.life().pixels.size()));
+    }
+    return sum;
+  };
+  EXPECT_TRUE(session.advance());
+  ASSERT_EQ(session.life().pixels.size(), 48u * 36);
+  const Rgb first = means();
+  EXPECT_LT(first.g, 0.1f);  // a frame of 16 at most
+  EXPECT_GT(first.r, 0.8f);
+  session.play(true);
+  for (int i = 0; i < 20; ++i) session.advance();
+  const Rgb later = means();
+  EXPECT_GT(later.g, first.g + 0.02f);
+  EXPECT_GT(later.r, 0.02f);
+  session.show_life(false);
+  session.advance();
+  EXPECT_TRUE(session.life().pixels.empty());
+  // Those of temporal radiance caching: how long they will last.
+  session.set_method(SceneMethod::trc);
+  session.show_life(true);
+  session.advance();
+  EXPECT_EQ(session.life().pixels.size(), 48u * 36);
+  EXPECT_GT(means().g, 0.1f);
+}
+
 TEST(SceneSession, RunsWithoutAWindow) {
   SceneRunOptions options;
   options.scene = scene_file("moving-light");
