@@ -156,9 +156,12 @@ void study_norms(const StudyOptions& options, const std::filesystem::path& file)
     }
   }
   std::vector<double> largest;
+  std::string bands = "band,columns,largest_singular_value\n";
   for (int b = 0; b < layout.band_count(); ++b) {
     largest.push_back(spectral_norm(transport, layout.band(b), green));
+    bands += fmt::format("{},{},{:.6g}\n", b, layout.band(b).size(), largest.back());
   }
+  write_text(options.output.string() + ".bands.csv", bands);
   std::string text =
       "method,frame,error,rows_1,rows_16,rows_64,rows_256,rows_2048,all,"
       "green_all,green_band_spectra\n";
