@@ -19,7 +19,10 @@ constexpr double kFirstPart = 0.65;   // of the time, after which the first part
 constexpr double kLeastAim = 0.85;    // below that, time asked for would be left unspent
 constexpr double kMostAim = 0.92;     // the second part may be held up, too
 constexpr double kOutlier = 1.5;      // a frame that took so much longer was held up by others
-constexpr std::size_t kWarm = 16;     // frames after which outliers are known as such
+// Of a byte that is folded, against one of a column; what the last such frame weighs.
+constexpr double kFastestFold = 0.05, kSlowestFold = 2, kNewFold = 0.3;
+constexpr double kLeastOfOthers = 0.1;  // of the time of a frame that folds
+constexpr std::size_t kWarm = 16;       // frames after which outliers are known as such
 
 }  // namespace
 
@@ -44,6 +47,21 @@ double FrameTimeModel::bytes_within(double milliseconds) const {
   return std::max(0.0, (milliseconds - fixed_) / per_byte_);
 }
 
+void FoldTimeModel::add(double bytes, double folded, double milliseconds) {
+  if (folded > 0 && others_.known()) {
+    const double per_byte = others_.per_byte();
+    const double now = std::clamp((milliseconds - others_.predict(bytes - folded)) / folded,
+                                  kFastestFold * per_byte, kSlowestFold * per_byte);
+    per_folded_ = per_folded_ < 0 ? now : per_folded_ + kNewFold * (now - per_folded_);
+  }
+  const double of_folds = per_folded_ < 0 ? 0 : per_folded_ * folded;
+  if (others_.known() && folded > 0) {
+    others_.add(bytes - folded, std::max(milliseconds - of_folds, kLeastOfOthers * milliseconds));
+  } else {
+    others_.add(bytes, milliseconds);
+  }
+}
+
 TimeBudget::TimeBudget(std::vector<double> column_bytes) : column_bytes_(std::move(column_bytes)) {
   slower_.reserve(kRemembered);
   sorted_.reserve(kRemembered);
@@ -60,11 +78,6 @@ double TimeBudget::aim() const {
 
 double TimeBudget::elapsed() const {
   return std::chrono::duration<double, std::milli>(now_() - started_).count();
-}
-
-// Of frames like this one; before there were any, of the others.
-const FrameTimeModel& TimeBudget::like_this(const Models& models) const {
-  return models[models[folds()].known() ? folds() : 1 - folds()];
 }
 
 void TimeBudget::start(double milliseconds, Clock::time_point now,
@@ -93,8 +106,8 @@ double TimeBudget::to_take_back(const BandMask& reset) const {
 
 BandMask TimeBudget::allow(const BandMask& wanted, std::span<const double> gain) {
   const double left = aim() * wanted_ - elapsed();
-  const double bytes = parts_ ? like_this(first_).bytes_within(left - second_.predict(0))
-                              : like_this(whole_).bytes_within(left);
+  const double bytes = parts_ ? first_.bytes_within(left - second_.predict(0), fixed_bytes_)
+                              : whole_.bytes_within(left, fixed_bytes_);
   if (fixed_bytes_ + to_take_back(wanted) <= bytes) return wanted;
   // The most gain for its bytes first, as long as they fit.
   BandMask allowed, seen;
@@ -123,9 +136,10 @@ void TimeBudget::begin(std::span<const Rgb>, std::span<const Rgb>, const BandMas
   begun_ms_ = elapsed();
   moved_ = fixed_bytes_ + to_take_back(reset);
   const double end = aim() * wanted_;
-  allowed_ = parts_ ? like_this(first_).bytes_within(
-                          std::min(kFirstPart * wanted_, end - second_.predict(0)) - begun_ms_)
-                    : like_this(whole_).bytes_within(end - begun_ms_);
+  allowed_ = parts_ ? first_.bytes_within(
+                          std::min(kFirstPart * wanted_, end - second_.predict(0)) - begun_ms_,
+                          fixed_bytes_)
+                    : whole_.bytes_within(end - begun_ms_, fixed_bytes_);
   if (most_moved_ > 0) allowed_ = std::min(allowed_, 2 * most_moved_);
 }
 
@@ -158,18 +172,22 @@ void TimeBudget::remember(double ratio) {
 
 void TimeBudget::finish(double milliseconds) {
   if (!any_) return;  // nothing was done, and nothing is learnt
-  FrameTimeModel& last = parts_ ? second_ : whole_[folds()];
-  const double predicted = (parts_ ? second_ : like_this(whole_)).predict(moved_);
+  const double predicted = parts_ ? second_.predict(moved_) : whole_.predict(moved_, fixed_bytes_);
   const double before = parts_ ? resumed_ms_ : begun_ms_;
   const bool warm = slower_.size() >= kWarm;
-  // Of a frame that was held up, no more than this.
-  const auto learn = [&](FrameTimeModel& model, double bytes, double took) {
-    model.add(bytes,
-              warm && model.known() ? std::min(took, kOutlier * model.predict(bytes)) : took);
-  };
   remember(warm ? milliseconds / (before + predicted) : slower_.empty() ? kSlowAtFirst : 1);
-  if (parts_) learn(first_[folds()], moved_first_, resumed_ms_ - begun_ms_);
-  learn(last, moved_, milliseconds - before);
+  // Of a frame that was held up, no more than this is learnt.
+  const auto at_most = [&](double took, double foreseen) {
+    return warm ? std::min(took, kOutlier * foreseen) : took;
+  };
+  if (parts_) {
+    const double took = resumed_ms_ - begun_ms_;
+    first_.add(moved_first_, fixed_bytes_,
+               at_most(took, first_.predict(moved_first_, fixed_bytes_)));
+    second_.add(moved_, at_most(milliseconds - before, predicted));
+  } else {
+    whole_.add(moved_, fixed_bytes_, at_most(milliseconds - before, predicted));
+  }
   most_moved_ = std::max(most_moved_, moved_first_ + moved_);
 }
 

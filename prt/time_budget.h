@@ -22,6 +22,7 @@ class FrameTimeModel {
   /// A frame that had `bytes` to move took `milliseconds`.
   void add(double bytes, double milliseconds);
   double predict(double bytes) const { return fixed_ + per_byte_ * bytes; }
+  double per_byte() const { return per_byte_; }
   /// Whether anything was measured.
   bool known() const { return weight_ > 0; }
   /// The most bytes that are predicted to take at most so long; 0 if none.
@@ -30,6 +31,27 @@ class FrameTimeModel {
  private:
   double weight_ = 0, bytes_ = 0, time_ = 0, bytes_bytes_ = 0, bytes_time_ = 0;
   double fixed_ = 0, per_byte_ = 1 / 4e6;  // 4 GB/s, until something is known
+};
+
+/// The same of frames that may fold logs beside, whose bytes are streamed and take less time each
+/// than those of columns: what they take is learnt apart, from what such frames took more than
+/// others would have. Before there were any, they count as columns.
+class FoldTimeModel {
+ public:
+  /// `folded` of the bytes were folded.
+  void add(double bytes, double folded, double milliseconds);
+  double predict(double bytes, double folded) const {
+    return others_.predict(bytes - folded) + per_folded() * folded;
+  }
+  double bytes_within(double milliseconds, double folded) const {
+    return folded + others_.bytes_within(milliseconds - per_folded() * folded);
+  }
+
+ private:
+  double per_folded() const { return per_folded_ < 0 ? others_.per_byte() : per_folded_; }
+
+  FrameTimeModel others_;
+  double per_folded_ = -1;  // below 0: not known yet
 };
 
 /// Ends updates so that frames stay within a time. Where the renderer takes a frame in two parts,
@@ -70,16 +92,11 @@ class TimeBudget final : public UpdateLimit {
  private:
   double aim() const;
   double elapsed() const;
-  std::size_t folds() const { return fixed_bytes_ > 0 ? 1 : 0; }
   double to_take_back(const BandMask& reset) const;
   void remember(double ratio);
 
   std::vector<double> column_bytes_;
-  // Of frames in one part, and of first parts, without and with fixed bytes: those are streamed,
-  // which is faster a byte than columns are. Of second parts.
-  using Models = std::array<FrameTimeModel, 2>;
-  const FrameTimeModel& like_this(const Models& models) const;
-  Models whole_, first_;
+  FoldTimeModel whole_, first_;  // of frames in one part, and of first parts
   FrameTimeModel second_;
   Clock::time_point (*now_)() = &Clock::now;
   std::array<double, HaarLayout::kMaxBands> reset_bytes_{};

@@ -153,6 +153,41 @@ TEST(TimeBudget, FramesThatFoldAreLearntApart) {
   EXPECT_NEAR(frame(0), before, 0.03 * before);
 }
 
+// A frame that folded much says little of what columns take: the next, which folds little and has
+// room for them, is not thought to be as fast.
+TEST(TimeBudget, OneFrameThatFoldsSaysNothingOfColumns) {
+  for (const bool parts : {false, true}) {
+    TimeBudget budget(std::vector<double>(1000, 1e4));
+    budget.set_clock(made_up_now);
+    const std::array<double, HaarLayout::kMaxBands> none{};
+    for (int frame = 0; frame < 40; ++frame) {
+      const double fold = frame == 30 ? 3e7 : frame > 30 && frame % 3 == 0 ? 4e6 : 0;
+      budget.start(4, g_now, none, fold, parts);
+      budget.begin({}, {}, {});
+      double took = 0;
+      const auto part = [&](double folded) {
+        double moved = 0;
+        for (int i = 0; i < 100000 && budget.take(i % 1000, {}); ++i) moved += 1e4;
+        const double ms = 0.25 + 1e-7 * moved + 3e-8 * folded;
+        pass(ms);
+        took += ms;
+      };
+      part(fold);
+      if (parts) {
+        budget.resume();
+        part(0);
+      }
+      budget.finish(took);
+      if (frame >= 20) {
+        EXPECT_LE(took, 1.1 * 4) << frame << " " << parts;
+      }
+      if (frame > 30) {
+        EXPECT_GE(took, 0.7 * 4) << frame << " " << parts;
+      }
+    }
+  }
+}
+
 // The first frame that folds is foreseen by what others took, not by a guess about the machine:
 // this one is ten times slower than the guess.
 TEST(TimeBudget, TheFirstFrameThatFoldsKnowsTheMachine) {
