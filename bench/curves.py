@@ -7,7 +7,7 @@ DATA_DIR holds meshes/ and environments/ as scripts/fetch_data.sh leaves them; w
 is left out. OUT_DIR gets transports, runs/*.csv (one a run; kept, so that a run that was cut off goes
 on), summary.csv, *.png next to the figures of Overbeck 2006, and curves.html, one file with all of it.
 All numbers come from haarlight and haarlight-study; this script adds up and draws. --quick takes one
-scene of 128x128 pixels and one light, a few minutes; --full takes all and hours.
+scene of 128x128 pixels and one light, a few minutes; --full takes all and about a day.
 
 Errors and times are measured in runs of their own: relighting exactly beside a method would take the
 caches from it. Needs numpy and matplotlib (Debian: python3-numpy, python3-matplotlib).
@@ -305,6 +305,11 @@ def front_curves(axis, table, x, y, low, high):
                               [max(r[high], 1e-7) for r in points], color=colour, alpha=0.10, lw=0)
     axis.set_xscale("log")
     axis.set_yscale("log")
+    if x == "ms":  # less than two decades
+        from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+        axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axis.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axis.xaxis.set_minor_formatter(NullFormatter())
 
 
 def draw_fronts(table, at, file):
