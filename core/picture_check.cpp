@@ -10,6 +10,9 @@
 #include <cstdint>
 #include <cstring>
 #include <span>
+#include <string>
+#include <string_view>
+#include <utility>
 
 #include "core/error.h"
 #include "core/input_file.h"
@@ -22,6 +25,18 @@ constexpr unsigned char kExr[4] = {0x76, 0x2f, 0x31, 0x01};
 constexpr unsigned char kJpeg[3] = {0xff, 0xd8, 0xff};
 constexpr unsigned char kBmp[2] = {'B', 'M'};
 constexpr unsigned char kRiff[4] = {'R', 'I', 'F', 'F'};
+
+// Attributes of an EXR whose values are all of one size, in bytes.
+constexpr std::pair<std::string_view, std::uint64_t> kExrKinds[] = {
+    {"box2f", 16},      {"box2i", 16},    {"chromaticities", 32},
+    {"compression", 1}, {"double", 8},    {"envmap", 1},
+    {"float", 4},       {"int", 4},       {"keycode", 28},
+    {"m33d", 72},       {"m33f", 36},     {"m44d", 128},
+    {"m44f", 64},       {"v2d", 16},      {"v2f", 8},
+    {"v2i", 8},         {"v3d", 24},      {"v3f", 12},
+    {"v3i", 12},        {"rational", 8},  {"tiledesc", 9},
+    {"timecode", 8},    {"lineOrder", 1}, {"deepImageState", 1},
+};
 
 // Pixels that a byte of file can hold; no format of these packs more but for pictures of one
 // colour.
@@ -106,14 +121,49 @@ class Walk {
       const std::size_t type = after_zero(0, found), size = after_zero(type, found);
       if (size + 4 > found) require(4, at + size);  // cut short, or a name too long for any reader
       if (size + 4 > buffer_.size()) return;
-      std::uint64_t length = 0;
-      for (std::size_t i = 4; i-- > 0;) length = length << 8 | byte(size + i);
-      require(length, at + size + 4);
-      at += size + 4 + length;
+      const std::string kind(reinterpret_cast<const char*>(buffer_.data()) + type, size - type - 1);
+      const std::uint64_t length = little(size, 4);
+      at += size + 4;
+      require(length, at);
+      if (takes(kind, at, length) != length) {
+        throw Error(ErrorKind::format,
+                    fmt::format("{}: is damaged: a {} takes {} bytes at byte {}, expected the {} "
+                                "that it says it takes",
+                                file_.string(), kind, takes(kind, at, length), at, length));
+      }
+      at += length;
     }
   }
 
  private:
+  // What the reader of an attribute of an EXR takes, whatever length the attribute says it has:
+  // from there on it would read lengths where there are none. Kinds that go by their length take
+  // it.
+  std::uint64_t takes(std::string_view kind, std::uint64_t at, std::uint64_t length) {
+    for (const auto& [name, bytes] : kExrKinds) {
+      if (kind == name) return bytes;
+    }
+    const std::uint64_t end = at + length;
+    std::uint64_t next = at;
+    if (kind == "chlist") {
+      // Names, each with a zero and sixteen bytes behind it; an empty one ends them.
+      while (next < end) {
+        const std::size_t name = after_zero(0, look(next, buffer_.size()));
+        if (name == 1) return next + 1 - at;
+        next += name + 16;
+      }
+      return next + 1 - at;
+    }
+    if (kind == "stringvector") {
+      while (next < end && look(next, 4) == 4) next += 4 + std::uint64_t{little(0, 4)};
+      return next - at;
+    }
+    if (kind == "preview" && look(at, 8) == 8) {
+      return 8 + 4 * std::uint64_t{little(0, 4)} * little(4, 4);
+    }
+    return length;
+  }
+
   unsigned byte(std::size_t i) const { return std::to_integer<unsigned>(buffer_[i]); }
 
   std::uint32_t little(std::size_t at, std::size_t bytes) const {

@@ -255,6 +255,34 @@ TEST(ImageIo, PicturesOfMoreThanTheirBytesAreRefusedFirst) {
   }
 }
 
+// Where an attribute takes more or less than it says, the next would be read from the middle of
+// something: its length may be 2 GiB.
+TEST(ImageIo, AttributesThatTakeWhatTheyDoNotSayAreRefused) {
+  const TemporaryFolder folder;
+  save_image(folder / "a.exr", Image(4, 4));
+  const std::string whole = read_bytes(folder / "a.exr");
+  EXPECT_EQ(refusal(folder / "b.exr", whole), "");
+  for (const std::string kind : {"chlist", "compression", "box2i", "lineOrder", "float", "v2f"}) {
+    for (const int change : {-1, 1}) {
+      std::string bytes = whole;
+      const std::size_t length = bytes.rfind('\0' + kind + '\0') + kind.size() + 2;
+      ASSERT_LT(length, bytes.size()) << kind;
+      bytes[length] = static_cast<char>(bytes[length] + change);
+      const std::string said = refusal(folder / "b.exr", bytes);
+      EXPECT_NE(said.find("b.exr: is damaged: a " + kind + " takes "), std::string::npos) << said;
+    }
+  }
+  // A string of 2 GiB in a list of eight bytes; a preview of 4 GiB in eight.
+  for (const auto& [kind, value] :
+       {std::pair<std::string, std::string>{"stringvector", "\xff\xff\xff\x7f-abc"},
+        {"preview", std::string("\0\x80\0\0\0\x80\0\0", 8)}}) {
+    const std::string bytes = whole.substr(0, 8) + "x" + '\0' + kind + '\0' +
+                              std::string("\x8\0\0\0", 4) + value + whole.substr(8);
+    const std::string said = refusal(folder / "b.exr", bytes);
+    EXPECT_NE(said.find("b.exr: is damaged: a " + kind + " takes "), std::string::npos) << said;
+  }
+}
+
 // Films, and pictures that make their readers fall, are left to other programs.
 TEST(ImageIo, OtherFormatsAreNotTried) {
   const TemporaryFolder folder;

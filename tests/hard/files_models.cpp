@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <random>
 #include <string>
 
@@ -30,7 +31,7 @@ template <typename Use>
 End in_own_process(const Use& use, unsigned seconds) {
   const pid_t child = ::fork();
   if (child == 0) {
-    ::alarm(seconds);
+    ::alarm(std::getenv("HAARLIGHT_SANITIZED") ? 20 * seconds : seconds);
     // Readers of others talk.
     const int quiet = ::open("/dev/null", O_WRONLY);
     ::dup2(quiet, STDOUT_FILENO);
