@@ -9,7 +9,8 @@ the first frame, whole and of diffuse reflections alone, and speedups of ic agai
 others 2009, Tables 1 and 2). motion.csv: the least time of the other frames, so that other work on the
 machine counts little, speedups of tic against igi and ic (Tables 3 and 4), and the medians of how many
 rays tic traces and saves. look.csv: LDR-FLIP, mean over pixels, of
-the last frame at --look against igi and against a path tracer without box filter (in place of Table 5).
+the last frame at --look against igi and against a path tracer without box filter (in place of Table 5),
+and how bright the picture is in the mean, of the paths'.
 What OUT_DIR holds already is kept; start in an empty folder when the program has changed.
 Needs numpy (Debian: python3-numpy).
 """
@@ -93,6 +94,7 @@ def look(options):
             d = difference(shown[a], shown[b])
             row[f"{a}_{b}"] = f"{d.mean():.4f}"
             row[f"{a}_{b}_above_0.2"] = f"{100 * (d > 0.2).mean():.2f} %"
+        row["tic_mean_to_path"] = f"{100 * pictures['tic'].mean() / pictures['path'].mean():.1f} %"
         table.append(row)
     return table
 
